@@ -65,10 +65,8 @@ def list_points(front: Front, full: bool) -> list[Row]:
     first, last = (head_numbers(problem, names) for names in (texts, free))
     rows: list[Row] = [(*first, "stable", "special", *last, "structure", "active limits")]
     for p in front.points:
-        design, label = (
-            p.solution.parameters,
-            p.label if full or len(p.label) <= _LABEL else f"{p.label[: _LABEL - 1]}…",
-        )
+        design = p.solution.parameters
+        label = p.label if full or len(p.label) <= _LABEL else f"{p.label[: _LABEL - 1]}…"
         objectives = list_numbers(problem, texts, dict(zip(texts, p.objectives, strict=True)), design, digits)
         numbers = list_numbers(problem, free, design, design, digits)
         rows.append((*objectives, say_whether(p.stable), label, *numbers, p.structure, ", ".join(p.limits)))

@@ -128,18 +128,16 @@ def _mark_up_runs(blocks: Sequence[Block], plain: bool) -> Iterator[str]:
     """Facts that follow each other are one list; pictures that do stand beside each other where there is room."""
     for (kind, labelled), run in groupby(blocks, key=lambda b: (type(b), isinstance(b, Sentence) and bool(b.label))):
         some: list[Any] = list(run)
-        if kind is Sentence and labelled:
+        if labelled:
             yield mark_list((one.label, one.text) for one in some)
-        elif kind is Figure:
-            drawn = [draw_figure(one) for one in some]
-            together = "\n".join(drawn)
-            yield f'<div class="beside">\n{together}\n</div>' if len(drawn) > 1 else together
+        elif kind is Figure and len(some) > 1:
+            drawn = "\n".join(map(draw_figure, some))
+            yield f'<div class="beside">\n{drawn}\n</div>'
         else:
-            for one in some:
-                yield _mark_up_block(one, plain)
+            yield from (_mark_up_block(one, plain) for one in some)
 
 
-def _mark_up_block(block: Any, plain: bool) -> str:
+def _mark_up_block(block: Block, plain: bool) -> str:
     match block:
         case Sentence(text, _, tone):
             lead = ' class="lead"' if tone in ("answer", "good", "doubt", "bad") else ""
@@ -148,33 +146,31 @@ def _mark_up_block(block: Any, plain: bool) -> str:
             return (f"<p><strong>{escape_text(title)}</strong></p>\n" if title else "") + mark_list(items)
         case Verbatim(text, label):
             return mark_verbatim(text.strip("\n"), label)
-    return _mark_table(block, plain)
+        case Figure():
+            return draw_figure(block)
+        case TableBlock():
+            return _mark_table(block, plain)
 
 
 def _mark_table(grid: TableBlock, plain: bool) -> str:
     """A table that can be sorted, a long one filtered too, without columns in which nothing stands."""
-    rows = grid.texts
-    rows = (
-        rows if not plain or grid.most is None or len(rows) <= grid.most else [*rows[: grid.most], ["…"] * len(rows[0])]
-    )
+    rows, most = grid.texts, grid.most
+    if plain and most is not None and len(rows) > most:
+        rows = [*rows[:most], ["…"] * len(rows[0])]
     columns = [column for column in zip(*rows, strict=True) if any(column[1:])]
     if not columns:
         return ""
     kinds = [_classify_column(column[1:]) for column in columns]
-    headed = any(column[0] for column in columns)
-    heads = "".join(
-        f'<th scope="col"{k}>{escape_text(c[0] or "remark")}</th>' for c, k in zip(columns, kinds, strict=True)
-    )
-    body = [*zip(*(column[1:] for column in columns), strict=True)]
+    heads, *body = zip(*columns, strict=True)
+    cells = "".join(f'<th scope="col"{k}>{escape_text(c or "remark")}</th>' for c, k in zip(heads, kinds, strict=True))
+    head = f"<thead><tr>{cells}</tr></thead>" if any(heads) else ""
     lines = "\n".join(f"<tr>{_mark_cells(row, kinds)}</tr>" for row in body)
-    head = f"<thead><tr>{heads}</tr></thead>" if headed else ""
     if plain:
         return f"<table>{head}<tbody>{lines}</tbody></table>"
-    kind = "sortable filterable" if len(body) >= _FILTERED else "sortable"
     said = f"On paper are the first {_ON_PAPER} of the rows that are shown."
     paper = f'\n<p class="print">{said}</p>' if len(body) > _ON_PAPER else ""
     caption = escape_text(grid.caption)
-    kind = f' class="{kind}"' if headed else ""
+    kind = f' class="sortable{" filterable" if len(body) >= _FILTERED else ""}"' if head else ""
     return (
         f'<div class="rows" role="group" tabindex="0" aria-label="{caption}"><table{kind}>\n'
         f"<caption>{caption}</caption>\n{head}\n<tbody>\n{lines}\n</tbody>\n</table></div>{paper}"
