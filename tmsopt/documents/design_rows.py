@@ -25,7 +25,7 @@ BRIEF = 5
 NOTHING = 1e-14
 """Share of the size of a root, or of 1: less is rounding."""
 _OF_RANGE = 1e-12  # share of a range: less is rounding
-_PERCENT = Unit("%", 0.01)
+PERCENT = Unit("%", 0.01)
 
 
 def convert_to_si(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
@@ -85,7 +85,7 @@ def list_quantities(solution: Solution, si: Mapping[str, float]) -> Iterator[Row
             continue
         cell = Cell(x, unit_of(problem, q.name))
         if q.share:
-            cell = Cell(x if abs(x) > FEASIBLE else 0.0, _PERCENT, 6)
+            cell = Cell(x if abs(x) > FEASIBLE else 0.0, PERCENT, 6)
         twin = q.counterpart
         also = "" if twin is None or values is None else _describe_twin(twin, float(twin.value(values)))
         yield q.name, cell, cell.unit.text, also, q.meaning

@@ -55,15 +55,10 @@ def _describe_cause(motion: "Simulation") -> str:
     """In words."""
     asked, time = motion.disturbance, motion.units.get("t", "")
     torque = "N m" if time == "s" else "m_B g w"
-    said = [
-        f"{_name_coordinate(name)} = {_format_with_unit(motion, name, value)}" for name, value in asked.start.items()
-    ]
-    said += [
-        f"an impulse of {n} torque of {x:.6g} {torque} {time}"
-        for n, x in (("steer", asked.push), ("lean", asked.lean_push))
-        if x
-    ]
-    said = [f"from {' and '.join(said)}"] if said else ["from rest"]
+    said = [f"{_name_coordinate(name)} = {_format_with_unit(motion, name, x)}" for name, x in asked.start.items()]
+    for name, push in (("steer", asked.push), ("lean", asked.lean_push)):
+        said += [f"an impulse of {name} torque of {push:.6g} {torque} {time}"] if push else []
+    said = [f"from {' and '.join(said) or 'rest'}"]
     if asked.noise:
         root = "√s" if time == "s" else "(w/g)^(1/4)"
         said.append(f"in white noise of steer torque of {asked.noise:.6g} {torque} {root} (seed {asked.seed})")
@@ -74,16 +69,16 @@ def _list_peaks(motion: "Simulation") -> Iterator[Sequence[str]]:
     noisy = bool(motion.disturbance.noise)
     yield ("", "peak", "at", *(("in the long run",) if noisy else ("overshoot", "settled within 2 % at")))
     for m in motion.measures:
-        rest: tuple[str, ...] = (f"{100 * m.overshoot:.3g} %", _format_with_unit(motion, "t", m.settling))
-        if noisy:
-            deviation = motion.deviations.get(m.name, math.nan)
-            rest = (f"± {_format_with_unit(motion, m.name, deviation)}" if math.isfinite(deviation) else "none",)
-        yield (
+        first = (
             _name_coordinate(m.name),
             _format_with_unit(motion, m.name, m.peak),
             _format_with_unit(motion, "t", m.at),
-            *rest,
         )
+        if noisy:
+            deviation = _format_with_unit(motion, m.name, motion.deviations.get(m.name, math.nan))
+            yield *first, "none" if deviation == "none" else f"± {deviation}"
+        else:
+            yield *first, f"{100 * m.overshoot:.3g} %", _format_with_unit(motion, "t", m.settling)
 
 
 def _list_modes(motion: "Simulation", full: bool) -> Iterator[Sequence[str]]:
@@ -108,10 +103,8 @@ def _write_notes(motion: "Simulation") -> Iterator[str]:
     merged = {(m.re, m.im): m for m in motion.modes if m.multiplicity > 1}
     yield from map(_describe_merging, merged.values())
     if merged:
-        what, moved = (
-            "eigenfrequencies" if motion.problem.model.double else "roots",
-            "which rounding moves by no more than itself",
-        )
+        what = "eigenfrequencies" if motion.problem.model.double else "roots"
+        moved = "which rounding moves by no more than itself"
         yield f"{what}: of the ideal design; motion: of the design as stored, {moved}"
     if not motion.stable and (words := _describe_axis(motion)):
         yield f"{words}; peaks are those of the time shown"
@@ -153,16 +146,14 @@ def _describe_axis(motion: "Simulation") -> str:
 
 
 def _describe_merging(mode: "ModeShape") -> str:
-    k, chains = mode.multiplicity, mode.partial
-    of_H = mode.eigenfrequency is not None
+    k, of_H = mode.multiplicity, mode.eigenfrequency is not None
     name = f"{'C' if mode.im and not of_H else ''}EP{k}"
-    many, roots, wave = _COUNTS.get(k, str(k)), "roots", "e^(st)"
-    if of_H:
-        roots, wave = "eigenfrequencies", "e^(-i omega t)"
+    many = _COUNTS.get(k, str(k))
+    roots, wave = ("eigenfrequencies", "e^(-i omega t)") if of_H else ("roots", "e^(st)")
     if mode.geometric == k:
         return f"{many} {roots} meet and keep {many} shapes: no chain, no power of t"
     if mode.geometric > 1:
-        return f"{many} {roots} meet in {mode.geometric} shapes, Jordan chains of {', '.join(map(str, chains))}"
+        return f"{many} {roots} meet in {mode.geometric} shapes, Jordan chains of {', '.join(map(str, mode.partial))}"
     top = "t" if k == 2 else f"t^{k - 1}"
     return f"{name}: {many} modes merge in one shape, a Jordan chain of {k}: the motion has terms up to {top} {wave}"
 

@@ -19,9 +19,11 @@ from tmsopt.documents.blocks import (
     Tone,
     Verbatim,
     Words,
+    count_things,
 )
 from tmsopt.documents.design_rows import (
     BRIEF,
+    PERCENT,
     convert_to_si,
     describe_inertia,
     describe_loads,
@@ -42,7 +44,7 @@ from tmsopt.documents.speeds import describe_range
 from tmsopt.evaluation import abscissa_as_stored
 from tmsopt.guide import describe
 from tmsopt.models import tms
-from tmsopt.problem import NO_RADIUS, Case, Unit, amounts_text, common_unit, show_at, status_text, unit_of
+from tmsopt.problem import NO_RADIUS, Case, Problem, amounts_text, common_unit, show_at, status_text, unit_of
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import limit_text
 from tmsopt.problem.verdict.stability import ROUNDED, STABLE, UNSTABLE
@@ -101,7 +103,8 @@ def write_solution(
     if page:
         yield from write_growth_picture(solution)
     yield Chapter("cases")
-    yield from _write_cases(solution)
+    if solution.worst is not None:
+        yield from _write_cases(solution, solution.worst)
     yield Chapter("limits", width="wide")
     yield from _write_limits(solution, analysis, full, page)
     if not brief:
@@ -112,7 +115,10 @@ def write_solution(
         return
     if full:
         yield Chapter("roots")
-        yield from _write_roots(solution, analysis)
+        if solution.multiple_as_rounded:
+            yield "roots meet as far as rounding tells; tmsopt prove tells it of the numbers as typed"
+        for diagnosis in analysis.diagnoses:
+            yield from write_diagnosis(diagnosis)
     yield Chapter("quantities", "Derived quantities", "wide")
     head = ("quantity", "value", "unit", "in SI", "meaning")
     yield TableBlock((head, *list_quantities(solution, scaled)), "Quantities of the design")
@@ -171,7 +177,11 @@ def _write_answer(solution: Solution, analysis: Analysis, brief: bool, full: boo
         joined = ": " not in ended.text and obstacles
         yield Sentence(f"{ended.text}: {obstacles[0]}" if joined else ended.text, tone="bad")
         yield from obstacles[1:] if joined else obstacles
-        yield from (Sentence(text, "violated") for text in _list_violations(solution))
+        for name, value in solution.violations.items():
+            unit = unit_of(solution.problem.posed, name)
+            by = f" by {unit.show(value, 4)}" if math.isfinite(value) else ", which has no value"
+            by = "" if name in _OTHER else by
+            yield Sentence(f"{name} ({_describe_limit(solution, name)}){by}", "violated")
         yield Sentence(asked.text, "nearest design")
     else:
         yield ended
@@ -179,18 +189,14 @@ def _write_answer(solution: Solution, analysis: Analysis, brief: bool, full: boo
         yield from obstacles
     yield from further if full else ()
     yield Sentence(proof_line(solution), "proof")
-    active = [
-        f"{name} ({text})" if (text := limit_text(solution.problem.posed, name)) else name for name in solution.active
-    ]
-    yield Sentence(", ".join(active if brief else ()), "active limits")
+    if brief:
+        active = (f"{name} ({_describe_limit(solution, name)})".removesuffix(" ()") for name in solution.active)
+        yield Sentence(", ".join(active), "active limits")
 
 
-def _list_violations(solution: Solution) -> Iterator[str]:
+def _describe_limit(solution: Solution, name: str) -> str:
     problem = solution.problem.posed
-    for name, value in solution.violations.items():
-        asked = limit_text(problem, name) or ("pattern" if name in problem.located else _OTHER.get(name, ""))
-        by = f" by {unit_of(problem, name).show(value, 4)}" if math.isfinite(value) else ", which has no value"
-        yield f"{name} ({asked}){by if name not in _OTHER else ''}"
+    return limit_text(problem, name) or ("pattern" if name in problem.located else _OTHER.get(name, ""))
 
 
 def _write_design(solution: Solution, si: Mapping[str, float], brief: bool, scaled: bool) -> Parts:
@@ -223,59 +229,47 @@ def _write_motion(solution: Solution, analysis: Analysis, si: Mapping[str, float
     yield Sentence(describe_inertia(solution), inertia)
 
 
-def _write_cases(solution: Solution) -> Parts:
+def _write_cases(solution: Solution, worst: Case) -> Parts:
     """The worst case, and what is known of all of them."""
-    if solution.worst is None:
-        return
-    of, cover = solution.problem, solution.cover
-    yield Sentence(
-        f"{_describe_case(solution, solution.worst)}; motion and roots are those there, the rest nominal", "worst case"
-    )
-    if solution.least_damped not in (None, solution.worst) and of.model.carrier is None:
+    of, cover, damped, fastest = solution.problem, solution.cover, solution.least_damped, solution.fastest
+    yield Sentence(f"{_describe_case(of, worst)}; motion and roots are those there, the rest nominal", "worst case")
+    if damped not in (None, worst) and of.model.carrier is None:
         label = "least damped case found" if of.tolerances else "least damped case"
-        yield Sentence(f"{_describe_case(solution, solution.least_damped)}; the damping ratio is that there", label)
-    if solution.fastest is not None and solution.fastest != solution.worst:
-        text = f"{_describe_case(solution, solution.fastest)}; limits on the frequency are on that there"
-        yield Sentence(text, "fastest case")
+        yield Sentence(f"{_describe_case(of, damped)}; the damping ratio is that there", label)
+    if fastest not in (None, worst):
+        yield Sentence(f"{_describe_case(of, fastest)}; limits on the frequency are on that there", "fastest case")
     if cover is not None:
         means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "looked for, not proven"
         unit = common_unit(of.posed, "abscissa")
         yield Sentence(f"abscissa at most {Cell(cover.limit, unit, named=True)}, {means}", "every case")
 
 
-def _describe_case(solution: Solution, case: Case) -> str:
+def _describe_case(of: Problem, case: Case) -> str:
     """Values of scenarios and errors of parameters in a case."""
-    units = {n: unit_of(solution.problem.posed, n) for n in {**case.at, **case.offset}}
-    at = [f"{n} = {units[n].show(v, 6)}" for n, v in case.at.items()]
-    return ", ".join(
-        [*at, *(f"{n} {'+' if v >= 0 else '−'} {units[n].show(abs(v), 6)}" for n, v in case.offset.items())]
-    )
+    problem = of.posed
+    at = [f"{n} = {unit_of(problem, n).show(v, 6)}" for n, v in case.at.items()]
+    at += [f"{n} {'+' if v >= 0 else '−'} {unit_of(problem, n).show(abs(v), 6)}" for n, v in case.offset.items()]
+    return ", ".join(at)
 
 
 def _write_limits(solution: Solution, analysis: Analysis, full: bool, page: bool) -> Parts:
     found = analysis.full_explanation if full else analysis.explanation
-    if page and (rows := list_limits(solution)):
+    names = dict.fromkeys((*solution.problem.constraints, *solution.violations))
+    if page and names:
+        rows = ((n, _describe_limit(solution, n), _describe_standing(solution, n)) for n in names)
         yield TableBlock((("limit", "says", "stands"), *rows), "Limits, and how they stand")
-    if found is not None and found.levers:
-        worth = [list_lever(solution, lever) for lever in found.levers]
+    if found is None:
+        return
+    if found.levers:
         head = ("active limit", "stands at", "a move of it", "buys, to first order")
+        worth = (_list_lever(solution, lever) for lever in found.levers)
         yield TableBlock((head, *worth), "What the active limits are worth", most=_LIMITS)
         yield from (lever.sentence for lever in found.levers if full)
-    yield from (Sentence(text, "warning", "doubt") for text in (found.warnings if found else ()))
-
-
-def list_limits(solution: Solution) -> list[tuple[str, str, str]]:
-    """Each constraint, and what else is violated: what it says, and whether it holds, is active or is violated."""
-    problem = solution.problem.posed
-    others = [name for name in solution.violations if name not in problem.constraints]
-    said = {
-        n: limit_text(problem, n) or ("pattern" if n in problem.located else "")
-        for n in (*problem.constraints, *others)
-    }
-    return [(name, text, _describe_standing(solution, name)) for name, text in said.items()]
+    yield from (Sentence(text, "warning", "doubt") for text in found.warnings)
 
 
 def _describe_standing(solution: Solution, name: str) -> str:
+    """Whether a limit holds, is active or is violated."""
     if name in solution.violations:
         by, unit = solution.violations[name], unit_of(solution.problem.posed, name)
         return f"violated by {unit.show(by, 4)}" if math.isfinite(by) else "has no value"
@@ -292,13 +286,14 @@ def _describe_margin(solution: Solution, name: str) -> str:
         -condition.sign * float(condition(problem.values(case.applied(solution.parameters)).with_known(radius)))
         for case in list_cases(solution) or [Case()]
     )
-    shares = {q.name for q in (*problem.model.quantities, *problem.parameter_set.quantities) if q.share}
+    quantities = (*problem.model.quantities, *problem.parameter_set.quantities)
     unit = unit_of(problem, name)
-    unit = Unit("%", 0.01) if not unit.text and shares & {*condition.names} else unit
+    if not unit.text and any(q.share and q.name in condition.names for q in quantities):
+        unit = PERCENT
     return f" by {unit.show(left, 4)}" if math.isfinite(left) else ""
 
 
-def list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
+def _list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
     """An active limit: its name, what it says, a small move of it, and what that buys to first order."""
     limit = limit_text(solution.problem.posed, lever.name)
     if not lever.step:
@@ -313,29 +308,21 @@ def _write_sureness(solution: Solution, analysis: Analysis, brief: bool, full: b
         yield Sentence(describe_robustness(robust, solution.stability.on_edge), "robustness")
         if full:
             yield tabulate_boundaries(robust)
-    if (found := analysis.explanation) is not None and found.precision:
+    found = analysis.explanation
+    if found is not None and found.precision:
         yield Sentence(describe_rounding(found), "rounding")
         if not brief:
             yield tabulate_rounding(found)
     if not brief:
         yield from bound_lines(solution)
-    if found is not None and not brief:
-        yield from write_optimality(found.optimality)
-
-
-def _write_roots(solution: Solution, analysis: Analysis) -> Parts:
-    if solution.multiple_as_rounded:
-        yield "roots meet as far as rounding tells; tmsopt prove tells it of the numbers as typed"
-    for diagnosis in analysis.diagnoses:
-        yield from write_diagnosis(diagnosis)
+        yield from write_optimality(found.optimality) if found else ()
 
 
 def _write_search(solution: Solution) -> Parts:
     free, starts, problem = solution.freedom, solution.starts, solution.problem
     if problem.locate:
-        parameters = "parameter" if free.free == 1 else "parameters"
-        conditions = "condition" if free.conditions == 1 else "conditions"
-        yield Sentence(f"{free.kind}, {free.free} free {parameters} and {free.conditions} {conditions}", "freedom")
+        parameters, conditions = count_things(free.free, "free parameter"), count_things(free.conditions, "condition")
+        yield Sentence(f"{free.kind}, {parameters} and {conditions}", "freedom")
     yield from list_branches(solution)
     if starts.tried:
         led = starts.tried - starts.runs
@@ -345,13 +332,12 @@ def _write_search(solution: Solution) -> Parts:
         yield Sentence(f"{tried}{sampled}; {solution.seconds:.2f} s", "starts")
 
 
-def list_branches(solution: Solution) -> list[str]:
+def list_branches(solution: Solution) -> Iterator[str]:
     """Other designs that solve the same equations, and what excludes them."""
-    problem, lines = solution.problem.posed, []
+    problem = solution.problem.posed
     for branch in solution.branches:
         where = ", ".join(f"{n} = {unit_of(problem, n).show(branch.parameters[n], ALL)}" for n in problem.free)
-        lines.append(f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}")
-    return lines
+        yield f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}"
 
 
 def _suggest_more(solution: Solution, analysis: Analysis) -> Sentence:
