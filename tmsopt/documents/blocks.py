@@ -1,6 +1,6 @@
 """A result as a document: sections of a few kinds of blocks. Renderers know these kinds, and no result."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Sized
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -165,20 +165,23 @@ class Document:
     sections: tuple[Chapter, ...] = ()
 
 
-Words = Iterator[Badge | str]
-"""What a result is and how it ended; empty ones are left out, here and in `Parts`."""
+Parts = Iterator[tuple[Badge | str, ...] | Chapter | Block | str]
+"""A document in the order in which it is read: its words, then chapters, each before its blocks; a text is a sentence.
 
-Parts = Iterator[Chapter | Block | str]
-"""A document in the order in which it is read: chapters, each before its blocks; a text is a sentence."""
+Empty words and sentences are left out, and the words of a result that is a part of another one.
+"""
 
 
-def count_things(count: int, one: str, many: str = "") -> str:
+def count_things(things: Sized | int, one: str, many: str = "") -> str:
     """A number of things in words, such as ``2 branches``."""
+    count = things if isinstance(things, int) else len(things)
     return f"{count} {one if count == 1 else many or one + 's'}"
 
 
-def judge(holds: bool, text: str) -> Badge:
-    """A verdict: a text, or that it is not so."""
+def judge(holds: bool | None, text: str) -> Badge:
+    """A verdict: a text, or that it is not so; empty where it is not known."""
+    if holds is None:
+        return Badge("")
     return Badge(text, "good") if holds else Badge(f"not {text}", "bad")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tmsopt import plots
 from tmsopt.charts.chart import Chart
-from tmsopt.documents.blocks import Cell, Chapter, Figure, Level, Parts, Sentence, TableBlock, Words
+from tmsopt.documents.blocks import Cell, Chapter, Figure, Level, Parts, Sentence, TableBlock
 from tmsopt.documents.curves import describe_domain, tabulate_corners
 from tmsopt.documents.tables import MOST, format_value, write_question
 from tmsopt.models import in_words_of
@@ -20,20 +20,15 @@ from tmsopt.roots import CLASSES
 _POINTS = 800 * 800  # of a chart that a picture shows
 
 
-def summarise_chart(chart: Chart) -> Words:
-    """Its grid, and the commonest classes."""
-    yield f"{' × '.join(str(len(v)) for v in chart.grid)} designs over {', '.join(chart.axes)}"
-    for name, share in sorted(chart.shares.items(), key=lambda item: -item[1])[:2]:
-        yield f"{100 * share:.3g} % {name}"
-
-
 def write_chart(chart: Chart, level: Level) -> Parts:
     """The classes with their shares, the best grid point, the boundaries of a plane in memory, and their corners."""
+    size, over = " × ".join(str(len(values)) for values in chart.grid), ", ".join(chart.axes)
+    most = sorted(chart.shares.items(), key=lambda item: -item[1])[:2]
+    yield f"{size} designs over {over}", *(f"{100 * share:.3g} % {name}" for name, share in most)
     data: dict[str, Any] = chart.to_json()
     problem = chart.problem.posed
     plane = chart.path is None and len(chart.axes) == 2
-    over = " and ".join(chart.axes) if plane else ", ".join(chart.axes)
-    size = " × ".join(str(a["points"]) for a in data["axes"].values())
+    over = " and ".join(chart.axes) if plane else over
     yield Sentence(f"{size} designs over {over}", tone="answer")
     yield Chapter("classes")
     yield from _write_classes(chart, data, plane)

@@ -16,7 +16,6 @@ from tmsopt.documents.blocks import (
     Row,
     Sentence,
     TableBlock,
-    Words,
     count_things,
 )
 from tmsopt.documents.tables import format_value, thin_rows, write_question
@@ -33,16 +32,10 @@ _ROUNDING = 1e-14  # mismatch of a coefficient at which a point has them all
 _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
 
 
-def summarise_trace(trace: Trace) -> Words:
-    """Pattern, branches, points, events."""
-    yield trace.pattern
-    yield count_things(len(trace.branches), "branch", "branches")
-    yield count_things(trace.points, "point")
-    yield count_things(len(trace.events), "event")
-
-
 def write_trace(trace: Trace, level: Level) -> Parts:
     """Branches with their events, in the free parameters."""
+    counts = count_things(trace.points, "point"), count_things(trace.events, "event")
+    yield trace.pattern, count_things(trace.branches, "branch", "branches"), *counts
     problem, model = trace.problem.posed, trace.problem.model
     yield Sentence(describe_trace(trace), tone="answer")
     if level == "page":
@@ -62,7 +55,7 @@ def describe_trace(trace: Trace) -> str:
     """How many branches and points, and what they took."""
     per_point = 1e6 * trace.seconds_walking / max(trace.points, 1)
     points = f", {trace.points} points at {per_point:.0f} µs each" if trace.points else ""
-    count = count_things(len(trace.branches), "branch", "branches")
+    count = count_things(trace.branches, "branch", "branches")
     pattern = in_words_of(trace.problem.model, trace.pattern)
     return f"{pattern}: {count}{points}, searched from {trace.starts} starts; {trace.seconds:.2f} s"
 
@@ -121,17 +114,10 @@ def _tabulate_points(trace: Trace) -> Parts:
     yield TableBlock(rows, "Points of the branches")
 
 
-def summarise_branch(branch: Branch) -> Words:
-    """The same of one branch."""
-    yield branch.pattern
-    yield count_things(len(branch), "point")
-    yield count_things(len(branch.events), "event")
-    yield "closed" if branch.closed else "open"
-
-
 def write_branch(branch: Branch, _level: Level) -> Parts:
     """One branch with its events, in the free parameters."""
     form = "closed" if branch.closed else "open"
+    yield branch.pattern, count_things(branch, "point"), count_things(branch.events, "event"), form
     found = f"{branch.pattern}: {len(branch)} points, {form}, coefficients met to {branch.residual:.0e}"
     yield Sentence(found, tone="answer")
     yield Chapter("events")
@@ -139,15 +125,10 @@ def write_branch(branch: Branch, _level: Level) -> Parts:
     yield TableBlock(list_events(branch, units), "Events along the branch")
 
 
-def summarise_domain(domain: Domain) -> Words:
-    """How many arcs and corners."""
-    yield f"stability: {count_things(len(domain.stability), 'arc')}"
-    yield f"heavy damping: {count_things(len(domain.heavy_damping), 'arc')}"
-    yield count_things(len(domain.corners), "corner")
-
-
 def write_domain(domain: Domain, _level: Level) -> Parts:
     """What bounds stability and heavy damping, and the corners."""
+    stability, damping = (count_things(arcs, "arc") for arcs in (domain.stability, domain.heavy_damping))
+    yield f"stability: {stability}", f"heavy damping: {damping}", count_things(domain.corners, "corner")
     yield from describe_domain(domain)
     yield Chapter("corners")
     yield from tabulate_corners(domain)
@@ -181,15 +162,10 @@ def tabulate_corners(domain: Domain, problem: Posed | None = None) -> Iterator[T
     yield TableBlock((("corner", *_head_columns(units)), *rows), "Corners of the domains")
 
 
-def summarise_swallowtail(found: Swallowtail) -> Words:
-    """Axes and pieces."""
-    yield " ".join(found.axes)
-    yield count_things(len(found.patches), "patch", "patches")
-    yield f"edges: {count_things(len(found.cusps.branches), 'EP3 curve')}"
-
-
 def write_swallowtail(found: Swallowtail, _level: Level) -> Parts:
     """Pieces of the surface, then its edges as traces."""
+    edges = f"edges: {count_things(found.cusps.branches, 'EP3 curve')}"
+    yield " ".join(found.axes), count_things(found.patches, "patch", "patches"), edges
     damped = sum(patch.heavily_damped for patch in found.patches)
     pieces = f"{len(found.patches)} patches, {damped} of them bound heavy damping"
     yield Sentence(f"real negative double roots over {', '.join(found.axes)}: {pieces}", tone="answer")

@@ -11,22 +11,16 @@ from tmsopt.documents.blocks import (
     Sentence,
     TableBlock,
     Verbatim,
-    Words,
     count_things,
 )
 from tmsopt.guide import Description, Word as Symbol
 from tmsopt.models.expression import COMPARISONS
 
 
-def summarise_description(found: Description) -> Words:
-    """The model, and of how many parameters."""
-    yield found.model
-    yield f"degree {found.degree}"
-    yield " or ".join(count_things(len(of.parameters), "parameter") for of in found.sets)
-
-
 def write_description(found: Description, level: Level) -> Parts:
     """The model, its signs, what is asked, symbols, patterns and functions, each under its name."""
+    sizes = " or ".join(count_things(of.parameters, "parameter") for of in found.sets)
+    yield found.model, f"degree {found.degree}", sizes
     about = f"{found.model}: {found.meaning}, degree {found.degree}" if found.meaning != found.model else found.model
     yield Sentence(about, tone="answer")
     if found.omits:

@@ -18,6 +18,7 @@ from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit, show_at, unit_at, unit_of
 from tmsopt.problem.units import frequencies
 from tmsopt.problem.verdict.stability import ROUNDED
+from tmsopt.records import Numbers
 from tmsopt.roots import Root
 
 BRIEF = 5
@@ -28,15 +29,13 @@ _OF_RANGE = 1e-12  # share of a range: less is rounding
 PERCENT = Unit("%", 0.01)
 
 
-def convert_to_si(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
+def convert_to_si(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Numbers:
     """SI parameters: as solved for, or of dimensionless skates for the given wheelbase, rear mass and gravity."""
     own = solution.problem.posed.parameter_set.rate is not None or len(solution.problem.model.sets) == 1
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
 
-def list_parameters(
-    solution: Solution, si: Mapping[str, float], brief: bool = False
-) -> Iterator[tuple[str, Cell, str, str, str]]:
+def list_parameters(solution: Solution, si: Numbers, brief: bool = False) -> Iterator[tuple[str, Cell, str, str, str]]:
     """Name, number, role, what it is in the other set, and meaning of each parameter.
 
     Parameters that are 0 by default are left out.
@@ -63,7 +62,7 @@ def list_parameters(
         yield p.name, Cell(x, unit_of(problem, p.name), digits, named=brief), role, also, meaning
 
 
-def tabulate_parameters(solution: Solution, si: Mapping[str, float]) -> TableBlock:
+def tabulate_parameters(solution: Solution, si: Numbers) -> TableBlock:
     """Every parameter with its role, its range, what it is in the other set, and its meaning."""
     ranges = {w.name: w.given for of in describe(solution).sets for w in of.parameters}
     other = "without units" if solution.problem.posed.parameter_set.rate is not None else "in SI"
@@ -73,7 +72,7 @@ def tabulate_parameters(solution: Solution, si: Mapping[str, float]) -> TableBlo
     return TableBlock(rows, "Parameters of the design")
 
 
-def list_quantities(solution: Solution, si: Mapping[str, float]) -> Iterator[Row]:
+def list_quantities(solution: Solution, si: Numbers) -> Iterator[Row]:
     """Name, number, unit, the same in SI for a dimensionless one, and meaning of each quantity that exists."""
     problem = solution.problem.posed
     of = problem.parameter_set
@@ -97,7 +96,7 @@ def list_cases(solution: Solution) -> list[Case]:
     return stated + [case for case in (solution.worst, solution.least_damped, solution.fastest) if case is not None]
 
 
-def parameters_of_worst_case(solution: Solution) -> Mapping[str, float]:
+def parameters_of_worst_case(solution: Solution) -> Numbers:
     """The parameters in the case that roots and abscissa belong to: of a band the worst one, else the design's own."""
     return solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
 
@@ -152,7 +151,7 @@ def describe_loads(solution: Solution) -> str:
     return ", ".join(parts)
 
 
-def describe_pitching(solution: Solution, si: Mapping[str, float]) -> str:
+def describe_pitching(solution: Solution, si: Numbers) -> str:
     """Whether the bicycle pitches over, in any of its cases, and the ballast that prevents it."""
     problem, listed = solution.problem.posed, list_cases(solution)
     each: list[Mapping[str, Any]] = [problem.values(case.applied(solution.parameters)) for case in listed]

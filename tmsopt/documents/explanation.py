@@ -20,7 +20,6 @@ from tmsopt.documents.blocks import (
     Sentence,
     TableBlock,
     Tone,
-    Words,
     count_things,
 )
 from tmsopt.documents.design_rows import format_pair, format_root
@@ -34,17 +33,10 @@ _UNRESOLVED = (
 )
 
 
-def summarise_explanation(found: Explanation) -> Words:
-    """Structure, verdict, and how many limits and warnings there are."""
-    yield found.structure
-    yield from summarise_optimality(found.optimality)
-    yield count_things(len(found.levers), "limit")
-    if found.warnings:
-        yield count_things(len(found.warnings), "warning")
-
-
 def write_explanation(found: Explanation, _level: Level) -> Parts:
     """The meaning, local optimality, warnings, what limits are worth, what rounding costs."""
+    warnings = count_things(found.warnings, "warning") if found.warnings else ""
+    yield found.structure, *_judge_optimality(found.optimality), count_things(found.levers, "limit"), warnings
     yield Chapter("meaning")
     yield Sentence(found.summary, "meaning", "answer")
     yield from write_optimality(found.optimality)
@@ -129,16 +121,14 @@ def _list_rounded(which: str, to: str, row: RoundedDesign) -> tuple[str, ...]:
     return which, to, abscissa, f"{loss:.2g}", f"{ratio:.4g}", ", ".join(row.violations)
 
 
-def summarise_optimality(found: Optimality) -> Words:
-    """The verdict."""
+def _judge_optimality(found: Optimality) -> tuple[Badge, str]:
     tones: dict[str, Tone] = {STRICT: "good", NOT_MINIMAL: "bad"}
-    yield Badge(found.verdict, tones.get(found.verdict, "doubt"))
-    if found.order:
-        yield f"by order {found.order}"
+    return Badge(found.verdict, tones.get(found.verdict, "doubt")), f"by order {found.order}" if found.order else ""
 
 
 def write_optimality(found: Optimality, _level: Level = "full") -> Parts:
     """The verdict, then the multipliers of each root on the rightmost line."""
+    yield _judge_optimality(found)
     if found.verdict == NOT_COVERED:
         yield Sentence(f"not judged, for {found.reason}", "local optimality")
         return
@@ -163,15 +153,10 @@ def _drop_noise(x: float, size: float = 1.0) -> float:
     return 0.0 if abs(x) <= _ROUNDED * size else x
 
 
-def summarise_diagnosis(found: Diagnosis) -> Words:
-    """The root and its chains."""
-    yield f"{found.algebraic}-fold {'pair' if found.im else 'root'}"
-    yield format_pair(found.re, found.im, 5)
-    yield found.kind
-
-
 def write_diagnosis(found: Diagnosis, level: Level = "full") -> Parts:
     """Two sentences: the kind of the root, and how it splits; the laws of every parameter where all is wanted."""
+    what = "pair" if found.im else "root"
+    yield f"{found.algebraic}-fold {what}", format_pair(found.re, found.im, 5), found.kind
     full = level != "brief"
     yield Sentence(_describe_root(found), tone="answer")
     yield _describe_splitting(found, full)

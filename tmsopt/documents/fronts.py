@@ -11,7 +11,6 @@ from tmsopt.documents.blocks import (
     Row,
     Sentence,
     TableBlock,
-    Words,
     count_things,
     say_whether,
 )
@@ -22,23 +21,17 @@ from tmsopt.fronts.front import Front
 _LABEL, _ROWS = 40, 20  # characters of what happens at a point, and points, of a brief report
 
 
-def summarise_front(front: Front) -> Words:
-    """Objectives and the number of points."""
-    yield ", ".join(front.objectives)
-    yield count_things(len(front), "point")
-    if unstable := sum(not point.stable for point in front.points):
-        yield Badge(f"{unstable} not stable", "bad")
-
-
 def write_front(front: Front, level: Level) -> Parts:
     """Points one a row: objectives, structure, ends and kinks, active limits, free parameters, whether stable."""
+    unstable, points = sum(not point.stable for point in front.points), count_things(front, "point")
+    yield ", ".join(front.objectives), points, Badge(f"{unstable} not stable" if unstable else "", "bad")
     problem, full = front.problem.posed, level != "brief"
     where = f", designs with {problem.locate}" if problem.locate else ""
     special = ((len(front.kinks), "kink"), (len(front.gaps), "gap"))
     counted = "".join(f"{count_things(n, word)}, " for n, word in special if n)
     least = f"front of least {', '.join(t.strip() for t in front.objectives)}{where}"
     effort = f"{front.solved} sub-problems; {front.seconds:.2f} s"
-    yield Sentence(f"{least}: {count_things(len(front), 'point')}, {counted}{effort}", tone="answer")
+    yield Sentence(f"{least}: {count_things(front, 'point')}, {counted}{effort}", tone="answer")
     if level == "page":
         yield Chapter("picture", "Front")
         yield Figure(plots.front_figure, front, f"Front of {', '.join(front.objectives)}")

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from tmsopt import plots
-from tmsopt.documents.blocks import Chapter, Figure, Level, Parts, Sentence, TableBlock, Words, judge
+from tmsopt.documents.blocks import Chapter, Figure, Level, Parts, Sentence, TableBlock, judge
 from tmsopt.documents.design_rows import format_root
 from tmsopt.documents.tables import tabulate_records
 from tmsopt.dynamics.speeds import speed_of
@@ -22,18 +22,12 @@ _ROWS, _SHAPES = 8, 4  # of each table, coordinates of a shape, if not full
 _NOTHING = 1e-12  # of a root: a real part so small is rounding, and on the axis beside the largest
 
 
-def summarise_simulation(motion: "Simulation") -> Words:
-    """How long, and how far its first coordinates go."""
-    yield f"over {motion['t'][-1]:.4g} {motion.units.get('t', '')}".rstrip()
-    for measure in motion.measures[:2]:
-        yield f"peak {measure.name} = {measure.peak:.4g} {motion.units.get(measure.name, '')}".rstrip()
-    yield motion.structure
-    if motion.stable is not None:
-        yield judge(motion.stable, "stable")
-
-
 def write_simulation(motion: "Simulation", level: Level) -> Parts:
     """What sets a design moving, peak, overshoot and settling time of each angle and torque, and the modes."""
+    units = motion.units
+    over = f"over {motion['t'][-1]:.4g} {units.get('t', '')}".rstrip()
+    peaks = (f"peak {m.name} = {m.peak:.4g} {units.get(m.name, '')}".rstrip() for m in motion.measures[:2])
+    yield over, *peaks, motion.structure, judge(motion.stable, "stable")
     time, name = _format_with_unit(motion, "t", motion["t"][-1]), speed_of(motion.problem.posed.parameter_set)
     at = f" at {name} = {unit_of(motion.problem.posed, name).show(motion.parameters[name])}" if name else ""
     yield f"motion over {time}{at} {_describe_cause(motion)}"

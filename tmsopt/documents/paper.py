@@ -14,7 +14,6 @@ from tmsopt.documents.blocks import (
     Sentence,
     TableBlock,
     Tone,
-    Words,
     count_things,
 )
 from tmsopt.documents.solution import list_branches, write_headline
@@ -31,17 +30,13 @@ _ABOUT = (
 )
 
 
-def summarise_comparison(comparison: Comparison) -> Words:
-    """How many laws apply and agree."""
+def write_comparison(comparison: Comparison, _level: Level) -> Parts:
+    """Laws and numbers side by side where laws are known, then the two formulations."""
     applying = [row for row in comparison.laws if row.applies]
     agree = sum(row.agrees is True for row in applying)
     tone: Tone = "doubt" if not applying else "good" if agree == len(applying) else "bad"
-    yield Badge(f"{agree} of {len(applying)} laws agree", tone)
-    yield f"solved as {comparison.other.formulation} too" if comparison.other else "no other formulation"
-
-
-def write_comparison(comparison: Comparison, _level: Level) -> Parts:
-    """Laws and numbers side by side where laws are known, then the two formulations."""
+    also = f"solved as {comparison.other.formulation} too" if comparison.other else "no other formulation"
+    yield Badge(f"{agree} of {len(applying)} laws agree", tone), also
     design = comparison.design
     model = design.problem.model
     yield from write_headline(design)
@@ -78,14 +73,10 @@ def _write_laws(comparison: Comparison) -> Parts:
         yield Sentence(f"{', '.join(named)}; {reason}", "not applicable to this design")
 
 
-def summarise_ledger(ledger: Ledger) -> Words:
-    """Entries per verdict."""
-    yield count_things(len(ledger.entries), "entry", "entries")
-    yield from (f"{count} {verdict}" for verdict, count in ledger.counts.items() if count)
-
-
 def write_ledger(ledger: Ledger, level: Level) -> Parts:
     """Every entry under its section, with the number of entries per verdict at the end."""
+    counted = (f"{count} {verdict}" for verdict, count in ledger.counts.items() if count)
+    yield count_things(ledger.entries, "entry", "entries"), *counted
     if level == "brief":
         yield ledger.source
     for number, (title, entries) in enumerate(groupby(ledger.entries, key=lambda entry: entry.section)):

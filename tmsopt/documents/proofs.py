@@ -17,7 +17,6 @@ from tmsopt.documents.blocks import (
     Row,
     Sentence,
     TableBlock,
-    Words,
     count_things,
     judge,
     say_whether,
@@ -41,22 +40,14 @@ if TYPE_CHECKING:
 _OF_OTHERS = re.compile(r"(.*\.)?[bcdW]\d+")  # of factors whose roots are listed
 
 
-def summarise_proof(proof: Proof) -> Words:
-    """Whether it is proved, and what."""
-    yield judge(proof.proved, "proved")
-    yield proof.pattern or "nothing"
-    yield f"{proof.digits} digits"
-    if proof.stable.holds is not None:
-        yield judge(proof.stable.holds, "stable")
-
-
 def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None) -> Parts:
     """The claim, the numbers with their radii, the facts that follow, and the numbers that were taken exactly.
 
     Args:
         design: what was proved: a page has its pictures and parameters too.
     """
-    verdict = judge(proof.proved, "proved")
+    verdict, stable = judge(proof.proved, "proved"), judge(proof.stable.holds, "stable")
+    yield verdict, proof.pattern or "nothing", f"{proof.digits} digits", stable
     yield Sentence(proof.claim, verdict.text, verdict.tone)
     yield Sentence(proof.reason, "why")
     if proof.problem is None:
@@ -186,18 +177,13 @@ def _write_verdict(label: str, verdict: Verdict) -> Sentence:
     return Sentence(f"{answer}, {verdict.words}", label)
 
 
-def summarise_every(every: Every) -> Words:
-    """How many designs, and whether they are all."""
-    yield count_things(len(every.solutions), "design")
-    complete = every.completeness is not None and every.completeness.complete
-    yield Badge("proved to be all", "good") if complete else "not proved to be all"
-
-
 def write_every(every: Every, _level: Level) -> Parts:
     """All designs with a pattern, one column each, and what the proof or the search says about others."""
     found, coverage, proof = every.solutions, every.coverage, every.completeness
     complete = proof is not None and proof.complete
-    many = count_things(len(found), "solution")
+    verdict = Badge("proved to be all", "good") if complete else "not proved to be all"
+    yield count_things(found, "design"), verdict
+    many = count_things(found, "solution")
     effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
     if not found:
         none = f"no design in the box and within the limits has the pattern (proved; {effort})"

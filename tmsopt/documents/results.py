@@ -2,14 +2,14 @@
 
 import math
 import platform
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib import import_module
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from tmsopt.documents.blocks import Badge, Block, Chapter, Document, Level, Sentence
+from tmsopt.documents.blocks import Badge, Block, Chapter, Document, Level, Parts, Sentence
 from tmsopt.documents.text import to_headline, to_text
 from tmsopt.errors import Fault, InputError, short
 from tmsopt.files import as_path, write_text
@@ -37,8 +37,7 @@ _RESULTS = {
 }
 """Module → the results that it shows, each with what draws it in `tmsopt.plots`, empty where nothing does.
 
-The module, loaded when one of them is shown, has for each two generators, such as `summarise_solution` of its words and
-`write_solution` of its parts.
+The module, loaded when one of them is shown, has for each a generator of its parts, such as `write_solution`.
 """
 
 HOME = {name: module for module, names in _RESULTS.items() for name in names}
@@ -56,35 +55,36 @@ def document_of(result: Any, level: Level = "brief", **options: Any) -> Document
     Args:
         options: of its writer, such as `si` of a solution.
     """
+    cover, parts = _open(result, level, **options)
     blocks: list[Block] = []
     chapters = {Chapter("answer"): blocks}
-    for part in _maker(result, "write")(result, level, **options):
-        block = Sentence(part) if isinstance(part, str) else part
-        if isinstance(block, Chapter):
-            blocks = chapters.setdefault(block, [])
-        elif not isinstance(block, Sentence) or block.text:
-            blocks.append(block)
+    for part in parts:
+        match part:
+            case Chapter():
+                blocks = chapters.setdefault(part, [])
+            case "" | Sentence("") | tuple():
+                continue
+            case str():
+                blocks.append(Sentence(part))
+            case _:
+                blocks.append(part)
     filled = (replace(chapter, blocks=tuple(blocks)) for chapter, blocks in chapters.items() if blocks)
-    return replace(_cover(result), level=level, sections=tuple(filled))
+    return replace(cover, sections=tuple(filled))
+
+
+def _open(result: Any, level: Level, **options: Any) -> tuple[Document, Parts]:
+    """The document without its chapters, and the parts that these are made of."""
+    name = type(result).__name__
+    module: Any = import_module(f"tmsopt.documents.{HOME[name]}")
+    parts = getattr(module, f"write_{name.lower()}")(result, level, **options)
+    words = [Badge(word) if isinstance(word, str) else word for word in next(parts)]
+    return Document(name, title_of(result), tuple(word for word in words if word.text), level), parts
 
 
 def picture_of(result: Any) -> str:
     """The name in `tmsopt.plots` of what draws a result; empty where nothing does."""
     name = type(result).__name__
     return _RESULTS[HOME[name]][name]
-
-
-def _maker(result: Any, verb: str) -> Callable[..., Iterator[Any]]:
-    name = type(result).__name__
-    maker: Callable[..., Iterator[Any]] = getattr(
-        import_module(f"tmsopt.documents.{HOME[name]}"), f"{verb}_{name.lower()}"
-    )
-    return maker
-
-
-def _cover(result: Any) -> Document:
-    words = (Badge(word) if isinstance(word, str) else word for word in _maker(result, "summarise")(result) if word)
-    return Document(type(result).__name__, title_of(result), tuple(words), "brief")
 
 
 def report(result: Any, full: bool = False) -> str:
@@ -94,7 +94,8 @@ def report(result: Any, full: bool = False) -> str:
 
 def headline(result: Any) -> str:
     """What it is and how it ended, then its title as far as there is room."""
-    return to_headline(_cover(result))
+    cover, _ = _open(result, "brief")
+    return to_headline(cover)
 
 
 def title_of(result: Any) -> str:
@@ -215,19 +216,15 @@ def _origin(
     text = mark_verbatim(report(result, full), "report as text")
     yield Chapter("text", "As text", "whole"), f"<details><summary>The report as text</summary>{text}</details>"
     seed = getattr(getattr(result, "study", None), "seed", seed)
-    about = {
-        **{name: found or "" for name, found in installed_versions(_PACKAGES).items()},
+    about = {name: found or "" for name, found in installed_versions(_PACKAGES).items()} | {
         "Python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}".strip(),
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "seed": "" if seed is None else str(seed),
     }
-    texts = "\n".join(
-        f"<h3>{escape_text(n)}</h3>\n{mark_verbatim(t, n)}"
-        for n, t in ({"command": command} | dict(files)).items()
-        if t
-    )
-    yield Chapter("origin", "Where it is from", "whole"), mark_list(about.items()) + texts
+    texts = ((name, text) for name, text in {"command": command, **files}.items() if text)
+    marked = "\n".join(f"<h3>{escape_text(name)}</h3>\n{mark_verbatim(text, name)}" for name, text in texts)
+    yield Chapter("origin", "Where it is from", "whole"), mark_list(about.items()) + marked
 
 
 def response(solution: Any, **asked: Any) -> Any:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from tmsopt.boundaries.nearest import Nearest, Robustness
-from tmsopt.documents.blocks import Cell, Chapter, Level, Parts, Sentence, TableBlock, Words, judge
+from tmsopt.documents.blocks import Cell, Chapter, Level, Parts, Sentence, TableBlock, judge
 from tmsopt.models import Model, in_words_of, words_of
 from tmsopt.problem.unit_system import unit_of
 
@@ -22,17 +22,10 @@ _OF_H = {"weave": "a real eigenfrequency"}
 _ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
 
 
-def summarise_robustness(found: Robustness) -> Words:
-    """How far stability reaches, and to what."""
-    if found.stable is not None:
-        yield judge(found.stable, "stable")
-    yield _format_value("radius" if found.stable else "to stability", found.limit.distance)
-    if found.limit.found:
-        yield f"to {found.limit.kind}"
-
-
 def write_robustness(found: Robustness, _level: Level) -> Parts:
     """The sentence, then the nearest point of every boundary."""
+    radius = _format_value("radius" if found.stable else "to stability", found.limit.distance)
+    yield judge(found.stable, "stable"), radius, f"to {found.limit.kind}" if found.limit.found else ""
     yield Sentence(describe_robustness(found), "robustness", "answer")
     yield Chapter("boundaries")
     yield tabulate_boundaries(found)
@@ -87,14 +80,9 @@ def tabulate_boundaries(found: Robustness) -> TableBlock:
     return TableBlock(list(zip(*rows, strict=True)) if transposed else rows, "Nearest points of the boundaries")
 
 
-def summarise_nearest(nearest: Nearest) -> Words:
-    """Which boundary, and how far."""
-    yield nearest.kind
-    yield _format_value("distance", nearest.distance) if nearest.found else "none found"
-
-
 def write_nearest(found: Nearest, _level: Level) -> Parts:
     """How far one boundary is, then its nearest point and the change of each parameter in weights."""
+    yield found.kind, _format_value("distance", found.distance) if found.found else "none found"
     if not found.found:
         yield f"no point of the boundary of {found.kind} was found"
         return

@@ -1,7 +1,7 @@
 """The report of a solution: the answer first, then what it does, its limits, how sure it is, and how to see more."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from tmsopt import plots
 from tmsopt.analysis import Lever, bound_lines, proof_line, structure_line
@@ -18,7 +18,6 @@ from tmsopt.documents.blocks import (
     TableBlock,
     Tone,
     Verbatim,
-    Words,
     count_things,
 )
 from tmsopt.documents.design_rows import (
@@ -49,29 +48,29 @@ from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import limit_text
 from tmsopt.problem.verdict.stability import ROUNDED, STABLE, UNSTABLE
 from tmsopt.problem.verdict.status import describe_status, describe_verdict
+from tmsopt.records import Numbers
 
 _FOLD, _FIXED = 5, 14  # rows of free parameters below each other, and fixed ones named, of a brief report
 _LIMITS = 3  # limits that a brief report shows
 _OTHER = {"a0": "must not be 0", "coefficients": "must have values"}
 
 
-def summarise_solution(solution: Solution) -> Words:
+def _summarise(solution: Solution) -> tuple[Badge | str, ...]:
     """Status, objective, structure, proof, stability."""
-    problem = solution.problem.posed
-    yield Badge(status_text(problem, solution.status), "good" if solution.status == "optimal" else "bad")
+    problem, stability = solution.problem.posed, solution.stability
     asked = problem.minimize or problem.maximize
     name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
-    yield f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}"
-    yield abscissa_as_stored(solution)
-    if solution.missed:
-        yield f"misses {amounts_text(problem, solution.missed)}"
-    yield solution.structure
-    if solution.bound.proven:
-        yield Badge("proved", "good")
-    if verdict := solution.stability.verdict:
-        rounded = ROUNDED if solution.stability.on_edge and not solution.edge_is_exact else ""
-        growth = f" as {solution.stability.growth}" if solution.stability.growth else ""
-        yield Badge(f"{verdict}{growth}{rounded}", judge_tone(solution))
+    rounded = ROUNDED if stability.on_edge and not solution.edge_is_exact else ""
+    growth = f" as {stability.growth}" if stability.growth else ""
+    return (
+        Badge(status_text(problem, solution.status), "good" if solution.status == "optimal" else "bad"),
+        f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}",
+        abscissa_as_stored(solution),
+        f"misses {amounts_text(problem, solution.missed)}" if solution.missed else "",
+        solution.structure,
+        Badge("proved" if solution.bound.proven else "", "good"),
+        Badge(f"{stability.verdict}{growth}{rounded}" if stability.verdict else "", judge_tone(solution)),
+    )
 
 
 def write_solution(
@@ -79,7 +78,7 @@ def write_solution(
     level: Level,
     *,
     full: bool = False,
-    si: Mapping[str, float] | None = None,
+    si: Numbers | None = None,
     tabulated: bool = False,
 ) -> Parts:
     """The parts of the report in order.
@@ -89,6 +88,7 @@ def write_solution(
         si: parameters in SI, such as `si_parameters` gives for another scale: a brief report shows them then.
         tabulated: whether a brief report, too, has every parameter with its meaning.
     """
+    yield _summarise(solution)
     analysis, scaled = solution.analysis, si or convert_to_si(solution)
     full, page, brief = full or level == "full", level == "page", level == "brief"
     yield Chapter("conflict" if solution.status == "infeasible" else "answer")
@@ -199,7 +199,7 @@ def _describe_limit(solution: Solution, name: str) -> str:
     return limit_text(problem, name) or ("pattern" if name in problem.located else _OTHER.get(name, ""))
 
 
-def _write_design(solution: Solution, si: Mapping[str, float], brief: bool, scaled: bool) -> Parts:
+def _write_design(solution: Solution, si: Numbers, brief: bool, scaled: bool) -> Parts:
     """Free parameters side by side where they are many, and the fixed ones in a sentence; or all in a table."""
     if not brief:
         yield tabulate_parameters(solution, si)
@@ -213,7 +213,7 @@ def _write_design(solution: Solution, si: Mapping[str, float], brief: bool, scal
     yield Sentence(", ".join(rest[:_FIXED]) + more, "fixed", "dim")
 
 
-def _write_motion(solution: Solution, analysis: Analysis, si: Mapping[str, float], brief: bool) -> Parts:
+def _write_motion(solution: Solution, analysis: Analysis, si: Numbers, brief: bool) -> Parts:
     at = describe_speed(solution, solution.worst)
     yield Sentence(f"{f'at {at}: ' if at else ''}{describe_motion(solution)}", "motion")
     if analysis.stable_speeds is not None:

@@ -14,7 +14,6 @@ from tmsopt.documents.blocks import (
     Row,
     Sentence,
     TableBlock,
-    Words,
     count_things,
 )
 from tmsopt.documents.design_rows import format_frequency, format_multiplicity
@@ -28,16 +27,11 @@ from tmsopt.problem.unit_system import Unit, common_unit, unit_of
 _DIGITS = 15
 
 
-def summarise_speeds(found: Speeds) -> Words:
-    """Where the design is stable."""
-    yield found.parameter
-    yield f"stable {_format_ranges(found.stable, unit_of(found.problem.posed, found.parameter))}"
-    yield count_things(len(found.found), "critical value")
-
-
 def write_speeds(found: Speeds, level: Level) -> Parts:
     """The stable and the heavily damped bands, and every speed with what happens there."""
     unit, real = unit_of(found.problem.posed, found.parameter), found.problem.model.carrier is None
+    stable = f"stable {_format_ranges(found.stable, unit)}"
+    yield found.parameter, stable, count_things(found.found, "critical value")
     end = f" < {unit.number(found.upper, 6)}" if math.isfinite(found.upper) else ""
     within = f" {unit.text}" if unit.text else ""
     asked = f"{unit.number(found.lower, 6)} < {found.parameter}{end}{within}"
@@ -74,16 +68,10 @@ def _tabulate_crossings(found: Speeds, unit: Unit, real: bool) -> Block | str:
     return TableBlock(rows, "Speeds at which the motion changes", needs=(3, 3, 1, 2))
 
 
-def summarise_growth(found: Growth) -> Words:
-    """Where the design is stable."""
-    yield f"over {found.over.name}"
-    yield f"stable {_format_ranges(found.stable, unit_of(found.problem.posed, found.over.name))}"
-    yield found.structure
-
-
 def write_growth(found: Growth, _level: Level) -> Parts:
     """Over what, where the design stands, and the stable and the heavily damped bands."""
     unit, real = unit_of(found.problem.posed, found.over.name), found.problem.model.carrier is None
+    yield f"over {found.over.name}", f"stable {_format_ranges(found.stable, unit)}", found.structure
     critical = f", critical value {unit.show(found.critical, 8)}" if math.isfinite(found.critical) else ""
     over = f"over {found.over.name} from {unit.number(found.values[0], 6)} to {unit.show(found.values[-1], 6)}"
     at = f"{found.over.name} = {unit.show(found.design, 8)}, structure {found.structure}{critical}"

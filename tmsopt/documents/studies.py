@@ -13,7 +13,6 @@ from tmsopt.documents.blocks import (
     Row as TableRow,
     Sentence,
     TableBlock,
-    Words,
     count_things,
     say_whether,
 )
@@ -33,14 +32,9 @@ _DIGITS = 6
 _SHARES = {"stable": "stable", "feasible": "every constraint met", "good": "both"}
 
 
-def summarise_results(results: Results) -> Words:
-    """Rows and how they ended."""
-    yield count_things(len(results.rows), "row")
-    yield from _count_statuses(results.study, results.summary)
-
-
 def write_results(results: Results, level: Level) -> Parts:
     """What varies, how the rows ended, the best one, what they say together, and the first rows."""
+    yield count_things(results.rows, "row"), *_count_statuses(results.study, results.summary)
     study, found, page = results.study, results.summary, level == "page"
     yield Sentence(_describe_study(study, found), tone="answer")
     if page:

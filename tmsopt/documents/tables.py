@@ -10,6 +10,7 @@ import numpy as np
 from tmsopt.documents.blocks import Cell, Chapter, Listing, Parts, TableBlock, say_whether
 from tmsopt.guide import describe
 from tmsopt.problem import Posed, unit_at
+from tmsopt.records import Numbers
 
 T = TypeVar("T")
 
@@ -38,7 +39,7 @@ def head_numbers(problem: Posed, names: Iterable[str]) -> list[str]:
 
 
 def list_numbers(
-    problem: Posed, names: Iterable[str], values: Mapping[str, float], design: Mapping[str, float], digits: int
+    problem: Posed, names: Iterable[str], values: Numbers, design: Numbers, digits: int
 ) -> list[Cell | str]:
     """Numbers of a design, each in the unit that stands in its heading; empty for one that is not there."""
     return [Cell(values[n], unit_at(problem, n, design), digits) if n in values else "" for n in names]
