@@ -78,8 +78,7 @@ def convert(
     problem = pose(given)
     if faults := [*_not_taken(problem, to, inertia)]:
         raise InputError(faults)
-    sizes = _sizes(problem, inertia, body, front)
-    faults = [*_without_counterpart(problem)]
+    sizes, faults = _sizes(problem, inertia, body, front), [*_without_counterpart(problem)]
     for which in sizes:
         if f"m_{which}" in problem.scenarios:
             message = "varies, and the inertia of a box would vary with it; give it one value, or --inertia none"
@@ -115,8 +114,7 @@ def converted_file(given: Given, **options: Any) -> str:
     problem = pose(given)
     converted, sizes = convert(problem, **options), _sizes(problem, **options)
     lines = ["The two masses of the model tms in the model whipple, without wheels and trail."]
-    for which, size in sizes.items():
-        name = {"B": "rear frame", "H": "front assembly"}[which]
+    for name, size in zip(("rear frame", "front assembly"), sizes.values(), strict=False):
         shown = " x ".join(f"{100 * x:.4g}" for x in size)
         lines.append(f"The {name} is a solid box of {shown} cm (length, width, height) about its centre of mass.")
     if sizes:
