@@ -38,8 +38,8 @@ from tmsopt.documents.design_rows import (
     tabulate_parameters,
 )
 from tmsopt.documents.explanation import describe_rounding, tabulate_rounding, write_diagnosis, write_optimality
+from tmsopt.documents.motion import describe_range
 from tmsopt.documents.robustness import describe_robustness, tabulate_boundaries
-from tmsopt.documents.speeds import describe_range
 from tmsopt.evaluation import abscissa_as_stored
 from tmsopt.guide import describe
 from tmsopt.models import tms
