@@ -109,10 +109,9 @@ def describe_motion(solution: Solution) -> str:
         return "no motion to describe: a root is at infinity"
     found = solution.stability
     growth = f"grows as {found.growth}{'' if solution.edge_is_exact else ROUNDED}"
+    lasts = growth if found.growth else "neither decay nor growth"
     if not found.on_edge:
         lasts = f"{'decay' if abscissa < 0 else 'growth'} time {time.show(1 / abs(abscissa), 4)}"
-    else:
-        lasts = growth if found.growth else "neither decay nor growth"
     if solution.problem.model.carrier is not None:
         edge = growth if found.growth else "neither loss nor gain"
         gain = f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({lasts})"
@@ -121,9 +120,9 @@ def describe_motion(solution: Solution) -> str:
     swings = [f for f in frequencies(solution.roots, rate) if f * 2 * math.pi > 1e-9 * rate]
     if not swings:
         return f"{lasts}; no oscillation"
-    shown = [f if hertz.text == "Hz" else 2 * math.pi * f for f in swings]
-    name = ("" if hertz.text == "Hz" else "angular ") + ("frequency" if len(shown) == 1 else "frequencies")
-    listed = " and ".join(f"{f:.4g}" for f in dict.fromkeys(shown))
+    turn, angular = (1.0, "") if hertz.text == "Hz" else (2 * math.pi, "angular ")
+    name = angular + ("frequency" if len(swings) == 1 else "frequencies")
+    listed = " and ".join(f"{turn * f:.4g}" for f in dict.fromkeys(swings))
     ratio, least = solution.quantities["damping_ratio"], describe_speed(solution, solution.least_damped)
     at = f" at {least}" if least and least != describe_speed(solution, solution.worst) else ""
     damping = f"damping ratio {ratio if abs(ratio) > NOTHING else 0:.4g}{at}"
@@ -151,14 +150,16 @@ def describe_loads(solution: Solution) -> str:
     return ", ".join(parts)
 
 
-def describe_pitching(solution: Solution, si: Numbers) -> str:
+def describe_pitching(solution: Solution) -> str:
     """Whether the bicycle pitches over, in any of its cases, and the ballast that prevents it."""
-    problem, listed = solution.problem.posed, list_cases(solution)
-    each: list[Mapping[str, Any]] = [problem.values(case.applied(solution.parameters)) for case in listed]
+    listed = list_cases(solution)
+    each: list[Mapping[str, Any]] = [
+        solution.problem.posed.values(case.applied(solution.parameters)) for case in listed
+    ]
     each = each or [solution.quantities]
     in_case = " in the worst case" if listed else ""
     for lifted, over in (("rear", "front"), ("front", "rear")):
-        load = min(float(values[f"load_{lifted}"]) for values in each)
+        load = min(float(case[f"load_{lifted}"]) for case in each)
         if abs(load) <= FEASIBLE:  # a limit chi_T <= 1 that is active is met within this
             return f"on the verge of pitching over the {over} wheel{in_case}; the {lifted} wheel carries no load"
         if load < 0:
@@ -169,14 +170,12 @@ def describe_pitching(solution: Solution, si: Numbers) -> str:
 def _describe_ballast(solution: Solution, each: Sequence[Mapping[str, Any]], lifted: str) -> str:
     """The ballast at a wheel's contact that has no part in the lateral motion: with trail, at the rear one alone."""
     problem = solution.problem.posed
-    if f"m_ballast_{lifted}" in problem.vocabulary:
-        mass = max(float(values[f"m_ballast_{lifted}"]) for values in each)
-        needed = unit_of(problem, "m_B").show(mass, 4)
-    elif f"ballast_{lifted}" in problem.vocabulary:
-        needed = f"{max(float(values[f'ballast_{lifted}']) for values in each):.4g} m_B"
-    else:
-        return ""
-    return f", unless ballast of {needed} is at the {lifted} contact, which does not change the motion"
+    units = {f"m_ballast_{lifted}": unit_of(problem, "m_B"), f"ballast_{lifted}": Unit("m_B")}
+    for name, unit in units.items():
+        if name in problem.vocabulary:
+            needed = unit.show(max(float(values[name]) for values in each), 4)
+            return f", unless ballast of {needed} is at the {lifted} contact, which does not change the motion"
+    return ""
 
 
 def describe_inertia(solution: Solution) -> str:

@@ -1,7 +1,6 @@
 """What an optimum means, what rounding does to it, and how its multiple roots split."""
 
 import math
-from collections.abc import Sequence
 from itertools import takewhile
 
 from tmsopt.analysis import NOT_COVERED, NOT_MINIMAL, STRICT, Response
@@ -61,8 +60,8 @@ def describe_rounding(found: Explanation) -> str:
     if not rows or not math.isfinite(found.abscissa):
         return ""
     stable = found.abscissa < -_NIL
-    held = list(takewhile(lambda row: _is_kept(row, found), reversed(rows)))  # few digits may do no harm by chance
-    enough = held[-1] if held else None
+    held = takewhile(lambda row: _is_near(row, found) and not row.violations, reversed(rows))
+    enough = [None, *held][-1]  # not just the fewest digits: these may do no harm by chance
     three = next((row for row in rows if row.digits == ALONE), None)
     parts, unstable = [], False
     if stable and three and three.realised < 0 and (enough is None or enough.digits > ALONE):
@@ -75,10 +74,6 @@ def describe_rounding(found: Explanation) -> str:
     parts.append(f"{last.digits} digits {(_describe_benefit if enough else _describe_cost)(last, found)}")
     needs = f"; {found.worst} needs the most" if found.worst and not unstable else ""
     return f"{'; '.join(parts)}{needs}"
-
-
-def _is_kept(row: RoundedDesign, found: Explanation) -> bool:
-    return _is_near(row, found) and not row.violations
 
 
 def _is_near(row: RoundedDesign, found: Explanation) -> bool:
@@ -108,17 +103,16 @@ def _describe_cost(row: RoundedDesign, found: Explanation) -> str:
 
 def tabulate_rounding(found: Explanation) -> TableBlock:
     """The design rounded, one parameter alone and then all together."""
-    rows: list[Sequence[str]] = [("rounded", "to", "abscissa", "loses", "damping_ratio", "violates")]
-    rows += [_list_rounded(f"{name} alone", row.written[name], row) for name, row in found.rounding.items()]
-    rows += [_list_rounded("all", f"{row.digits} digits", row) for row in found.precision]
-    known = any(math.isfinite(row.damping_ratio) for row in (*found.rounding.values(), *found.precision))
-    return TableBlock(rows if known else [(*row[:4], *row[5:]) for row in rows], "What rounding does")
-
-
-def _list_rounded(which: str, to: str, row: RoundedDesign) -> tuple[str, ...]:
-    ratio, loss = _drop_noise(row.damping_ratio), _drop_noise(row.loss)
-    abscissa = str(Cell(row.realised, error=_ROUNDED))
-    return which, to, abscissa, f"{loss:.2g}", f"{ratio:.4g}", ", ".join(row.violations)
+    named = [(f"{name} alone", row.written[name], row) for name, row in found.rounding.items()]
+    named += [("all", f"{row.digits} digits", row) for row in found.precision]
+    known = any(math.isfinite(row.damping_ratio) for *_, row in named)
+    heads = ("damping_ratio",) if known else ()
+    rows: list[Row] = [("rounded", "to", "abscissa", "loses", *heads, "violates")]
+    for which, to, row in named:
+        ratio = (f"{_drop_noise(row.damping_ratio):.4g}",) if known else ()
+        abscissa, loss = Cell(row.realised, error=_ROUNDED), f"{_drop_noise(row.loss):.2g}"
+        rows.append((which, to, abscissa, loss, *ratio, ", ".join(row.violations)))
+    return TableBlock(rows, "What rounding does")
 
 
 def _judge_optimality(found: Optimality) -> tuple[Badge, str]:

@@ -1,7 +1,7 @@
 """Proofs, and all designs with a pattern: what is proved, and to how many digits."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -156,8 +156,8 @@ def _write_facts(proof: Proof) -> Parts:
 
 def _write_exact_numbers(problem: Posed, proof: Proof) -> Parts:
     """Numbers that were taken exactly, and a word on angles."""
-    exact = [*(f"{name} = {_format_fraction(value)}" for name, value in proof.held.items()), *proof.numbers]
-    yield Sentence(", ".join(exact), "taken exactly")
+    held = (f"{name} = {_format_fraction(value)}" for name, value in proof.held.items())
+    yield Sentence(", ".join((*held, *proof.numbers)), "taken exactly")
     tangents = {p.name for p in problem.parameter_set.parameters if p.tangent} - set(proof.stated)
     if angles := [n for n in proof.held if n in tangents and proof.parameters[n].value != "0"]:
         yield Sentence("the decimal of the double in radians, not an angle in degrees", ", ".join(angles))
@@ -202,14 +202,13 @@ def write_every(every: Every, _level: Level) -> Parts:
 def _list_designs(every: Every, complete: bool) -> list[Row]:
     found, problem = every.solutions, every.solutions[0].problem
     names = [n for n in found[0].parameters if n in problem.free]
-    off: Sequence[Mapping[str, float]] = every.errors or ({},) * len(found)
-    pairs = list(zip(found, off, strict=True))
+    pairs = [*zip(found, every.errors or [{} for _ in found], strict=True)]
+    units = [unit_at(problem.posed, "abscissa", s.parameters) for s in found]
     rows: list[Row] = [("design", *(str(k) for k in range(1, len(found) + 1)))]
     rows += [(n, *(Cell(s.parameters[n], error=e.get(n, 0.0)) for s, e in pairs)) for n in names]
-    units = [unit_at(problem.posed, "abscissa", s.parameters) for s in found]
     decays = [Cell(s.abscissa, u, error=e.get("abscissa", 0.0)) for (s, e), u in zip(pairs, units, strict=True)]
     rows += [(f"abscissa {units[0].text}".rstrip(), *decays), ("structure", *(s.structure for s in found))]
-    rows += [("met", *(str(h) for h in every.coverage.hits))] if every.coverage else []
+    rows += [("met", *map(str, every.coverage.hits))] if every.coverage else []
     rows += [("proved", *map(say_whether, every.proved))] if any(every.proved) and not complete else []
     return rows
 
@@ -229,12 +228,9 @@ def _describe_proof(proof: Completeness, effort: str) -> Iterator[str]:
 def _describe_coverage(coverage: Coverage) -> Iterator[str]:
     if coverage.crossings:
         yield f"{coverage.crossings} starts ended where roots meet in a {CROSSING}"
-    doubt = (
-        f"; {coverage.singular} ended at designs with the pattern where its equations are singular: one of a "
-        "continuum of solutions, or one where two meet (tmsopt solve shows one)"
-        if coverage.singular
-        else ""
-    )
+    singular = f"; {coverage.singular} ended at designs with the pattern where its equations are singular: "
+    singular += "one of a continuum of solutions, or one where two meet (tmsopt solve shows one)"
+    doubt = singular if coverage.singular else ""
     yield (
         f"coverage of a search: {coverage.starts} starts over the box{doubt}; "
         f"{coverage.expected:.2f} solutions to be expected in all; "

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from tmsopt.boundaries.nearest import Nearest, Robustness
 from tmsopt.documents.blocks import Cell, Chapter, Level, Parts, Sentence, TableBlock, judge
-from tmsopt.models import Model, in_words_of, words_of
+from tmsopt.models import in_words_of, words_of
 from tmsopt.problem.unit_system import unit_of
 
 _MAIN = 0.5
@@ -50,32 +50,29 @@ def describe_robustness(found: Robustness, on_edge: bool = False) -> str:
         return f"{'' if found.stable else 'not stable; '}no change in reach of the search makes it {other}"
     if not found.stable:
         return f"not stable; {_describe_size(found)} makes it stable{_name_largest(limit)}"
-    return f"{_describe_size(found)} {_describe_event(found.problem.model, limit.kind)}{_name_largest(limit)}"
-
-
-def _describe_event(model: Model, kind: str) -> str:
-    if kind == "infinity":
-        return "takes a root through infinity (a0 = 0)"
-    word = words_of(model)[kind]
-    return f"makes it {_VERBS.get(word, word)}"
+    word = words_of(found.problem.model).get(limit.kind, "")
+    through = limit.kind == "infinity"
+    event = "takes a root through infinity (a0 = 0)" if through else f"makes it {_VERBS.get(word, word)}"
+    return f"{_describe_size(found)} {event}{_name_largest(limit)}"
 
 
 def tabulate_boundaries(found: Robustness) -> TableBlock:
     """The nearest point of every boundary: its distance and the change of each parameter."""
-    names = list(found.weights)
+    names, model = list(found.weights), found.problem.model
     kinds: tuple[Nearest, ...] = (found.weave, found.capsize, found.infinity, found.heavy_damping)
-    kinds = kinds if found.problem.model.carrier is None else kinds[:1]
-    rows: list[Sequence[str]] = [("relative changes" if found.relative else "changes in weights", "distance", *names)]
-    for n in kinds:
-        moves = _format_moves(n, found.relative) if n.found and n.distance else ["" for _ in names]
-        rows.append((_name_row(n, found), _format_distance(n, found), *moves))
     units = {name: unit_of(found.problem.posed, name) for name in names}
-    rows.append(("weight", "", *(units[name].show(found.weights[name], 6) for name in names)))
-    for n in kinds:
+    rows: list[Sequence[str]] = [("relative changes" if found.relative else "changes in weights", "distance", *names)]
+    places: list[Sequence[str]] = []
+    for n in kinds if model.carrier is None else kinds[:1]:
+        distance = "" if n.found else "none found"
+        moves = ["" for _ in names]
         if n.found and n.distance > 0:
-            at = "at" if n.kind == "infinity" else "with"
-            word = in_words_of(found.problem.model, n.kind)
-            rows.append((f"{at} {word}", "", *(units[name].show(n.parameters[name], 8) for name in names)))
+            distance = _format_percent(n.distance) if found.relative else f"{n.distance:.4g}"
+            moves = _format_moves(n, found.relative)
+            at = f"{'at' if n.kind == 'infinity' else 'with'} {in_words_of(model, n.kind)}"
+            places.append((at, "", *(units[name].show(n.parameters[name], 8) for name in names)))
+        rows.append((_name_row(n, found), distance, *moves))
+    rows += [("weight", "", *(units[name].show(found.weights[name], 6) for name in names)), *places]
     transposed = len(names) > _WIDE
     return TableBlock(list(zip(*rows, strict=True)) if transposed else rows, "Nearest points of the boundaries")
 
@@ -98,14 +95,6 @@ def _name_row(n: Nearest, found: Robustness) -> str:
     if n.kind != "heavy damping":
         return f"{to} {in_words_of(found.problem.model, n.kind)}"
     return f"{to} {n.kind}" if n.distance == 0 else f"{'out of' if found.heavily_damped else 'into'} {n.kind}"
-
-
-def _format_distance(n: Nearest, found: Robustness) -> str:
-    if not n.found:
-        return "none found"
-    if n.distance == 0:
-        return ""
-    return _format_percent(n.distance) if found.relative else f"{n.distance:.4g}"
 
 
 def _format_moves(n: Nearest, relative: bool) -> list[str]:

@@ -99,7 +99,7 @@ def write_solution(
     yield from _write_design(solution, scaled, brief and not tabulated, si is not None)
     yield from (Sentence(note, "note") for note in solution.notes)
     yield Chapter("motion")
-    yield from _write_motion(solution, analysis, scaled, brief)
+    yield from _write_motion(solution, analysis, brief)
     if page:
         yield from write_growth_picture(solution)
     yield Chapter("cases")
@@ -213,7 +213,7 @@ def _write_design(solution: Solution, si: Numbers, brief: bool, scaled: bool) ->
     yield Sentence(", ".join(rest[:_FIXED]) + more, "fixed", "dim")
 
 
-def _write_motion(solution: Solution, analysis: Analysis, si: Numbers, brief: bool) -> Parts:
+def _write_motion(solution: Solution, analysis: Analysis, brief: bool) -> Parts:
     at = describe_speed(solution, solution.worst)
     yield Sentence(f"{f'at {at}: ' if at else ''}{describe_motion(solution)}", "motion")
     if analysis.stable_speeds is not None:
@@ -223,7 +223,7 @@ def _write_motion(solution: Solution, analysis: Analysis, si: Numbers, brief: bo
     if not brief:
         yield from describe_stored(solution)
     if "load_rear" in solution.quantities:
-        yield Sentence(f"{describe_loads(solution)}; {describe_pitching(solution, si)}", "loads")
+        yield Sentence(f"{describe_loads(solution)}; {describe_pitching(solution)}", "loads")
     yield Sentence(solution.problem.model.omits, "model")
     inertia = "inertia at which it is no longer stable, each alone (radius of gyration)"
     yield Sentence(describe_inertia(solution), inertia)

@@ -108,17 +108,14 @@ def _write_facts(study: Study, found: Summary) -> Parts:
         given = ", ".join(f"{n} = {unit_of(problem, n).show(x, _DIGITS)}" for n, x in found.best.varied.items())
         best = show_at(problem, problem.goal or "", found.best.parameters, found.best.objective, _DIGITS)
         yield Sentence(f"row {found.best.number}, {best} at {given}", "best", "answer")
-    same = (study.problem.minimize or "").strip() == "abscissa"
-    for name, ends in found.spread.items():
-        if (same and name == "objective") or found.product is not None:
-            continue
-        least, median, most = (Cell(x, digits=_DIGITS) for x in found.clocked.get(name, ends))
-        unit = " 1/s" if name in found.clocked else ""
-        yield Sentence(f"{least} to {most}{unit}, median {median}{unit}", name)
     if found.product is None:
+        for name, ends in found.spread.items():
+            if name != "objective" or (study.problem.minimize or "").strip() != "abscissa":
+                least, median, most = (Cell(x, digits=_DIGITS) for x in found.clocked.get(name, ends))
+                unit = " 1/s" if name in found.clocked else ""
+                yield Sentence(f"{least} to {most}{unit}, median {median}{unit}", name)
         yield Sentence(f"{found.stable} of {sum(found.counts.values())} rows", "stable")
-    if found.structures:
-        yield Sentence(", ".join(f"{name} {count}" for name, count in found.structures.items()), "structures")
+    yield Sentence(", ".join(f"{name} {count}" for name, count in found.structures.items()), "structures")
     if found.proven and study.problem.free:
         yield Sentence(f"{found.proven} rows", "proven globally by the bound")
     if found.laws:
