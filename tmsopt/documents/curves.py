@@ -1,4 +1,4 @@
-"""What is drawn over parameters: traces with their branches, charts, domains, swallowtails."""
+"""Traces with their branches, charts, domains and swallowtails: what is drawn over parameters."""
 
 import math
 from collections.abc import Iterator, Mapping

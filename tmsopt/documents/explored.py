@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from tmsopt.models import in_words_of
@@ -100,11 +101,11 @@ def _list_results(results: "Results") -> Iterator[Named]:
     """The best row, and the one that decays least."""
     problem = results.study.problem.posed
     known = [row for row in results.rows if math.isfinite(row.abscissa)]
-    known.sort(key=lambda row: _decay_rate(problem, row))
+    rate = partial(_decay_rate, problem)
     if known:
-        best = results.summary.best or known[0]
+        best, last = results.summary.best or min(known, key=rate), max(known, key=rate)
         yield f"best, row {best.number}", best.parameters
-        yield f"greatest abscissa, row {known[-1].number}", known[-1].parameters
+        yield f"greatest abscissa, row {last.number}", last.parameters
 
 
 def _list_proof(proof: "Proof") -> Iterator[Named]:

@@ -166,7 +166,7 @@ def _describe_merging(mode: "ModeShape") -> str:
 
 
 def _unit_in(motion: "Simulation", name: str) -> Unit:
-    """Of angles and their rates in degrees."""
+    """The unit to show a column in: degrees for angles and their rates."""
     text = motion.units.get(name, "")
     return Unit(text.replace("rad", "deg"), math.radians(1)) if text.startswith("rad") else Unit(text)
 

@@ -1,5 +1,6 @@
 """A design compared with the laws of the paper, and the paper recomputed."""
 
+import re
 import textwrap
 from itertools import groupby
 
@@ -120,6 +121,4 @@ def write_ledger_page(ledger: Ledger) -> str:
 
 def _escape(text: str) -> str:
     """Text in which Markdown reads no markup."""
-    for sign in ("\\", "*", "_", "|", "<", "^"):
-        text = text.replace(sign, f"\\{sign}")
-    return text
+    return re.sub(r"([\\*_|<^])", r"\\\1", text)

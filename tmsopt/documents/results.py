@@ -2,7 +2,7 @@
 
 import math
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib import import_module
@@ -198,37 +198,36 @@ def save_report(
     place = as_path(path, "the file to write")
     if place.suffix.lstrip(".").lower() not in ENDINGS:
         raise InputError([Fault(f"found '{place}'; accepted: a file name ending in {', '.join(ENDINGS)}", ("path",))])
-    from tmsopt.documents.html import to_page
+    from tmsopt.documents.explored import frame_explorer
+    from tmsopt.documents.html import mark_verbatim, to_page
 
     steps = start_steps(progress, "writing the page", "part")
     options: dict[str, dict[str, Any]] = {"Solution": {"full": full}, "Proof": {"design": design}}
     document = document_of(result, "page", **options.get(type(result).__name__, {}))
     if steps:
         steps(1, math.nan, "the document is done")
-    more = _origin(result, command, files or {}, seed, full, design)
+    text = mark_verbatim(report(result, full), "report as text")
+    origin = _mark_origin({"command": command, **(files or {})}, getattr(getattr(result, "study", None), "seed", seed))
+    more = (
+        (Chapter("explorer", width="whole"), frame_explorer(result, design)),
+        (Chapter("text", "As text", "whole"), f"<details><summary>The report as text</summary>{text}</details>"),
+        (Chapter("origin", "Where it is from", "whole"), origin),
+    )
     write_text(place, to_page(document, more))
 
 
-def _origin(
-    result: Any, command: str, files: Mapping[str, str], seed: int | None, full: bool, design: "Solution | None"
-) -> Iterator[tuple[Chapter, str]]:
-    """The explorer, the report as text, then versions, system, date, seed, command and files."""
-    from tmsopt.documents.explored import frame_explorer
+def _mark_origin(texts: Mapping[str, str], seed: int | None) -> str:
+    """Versions, system, date, seed, then the command and the files."""
     from tmsopt.documents.html import escape_text, mark_list, mark_verbatim
 
-    yield Chapter("explorer", width="whole"), frame_explorer(result, design)
-    text = mark_verbatim(report(result, full), "report as text")
-    yield Chapter("text", "As text", "whole"), f"<details><summary>The report as text</summary>{text}</details>"
-    seed = getattr(getattr(result, "study", None), "seed", seed)
     about = {name: found or "" for name, found in installed_versions(_PACKAGES).items()} | {
         "Python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}".strip(),
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "seed": "" if seed is None else str(seed),
     }
-    texts = ((name, text) for name, text in {"command": command, **files}.items() if text)
-    marked = "\n".join(f"<h3>{escape_text(name)}</h3>\n{mark_verbatim(text, name)}" for name, text in texts)
-    yield Chapter("origin", "Where it is from", "whole"), mark_list(about.items()) + marked
+    marked = (f"<h3>{escape_text(name)}</h3>\n{mark_verbatim(text, name)}" for name, text in texts.items() if text)
+    return mark_list(about.items()) + "\n".join(marked)
 
 
 def response(solution: Any, **asked: Any) -> Any:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 
 from tmsopt import plots
-from tmsopt.analysis import Lever, bound_lines, proof_line, structure_line
+from tmsopt.analysis import Explanation, Lever, bound_lines, proof_line, structure_line
 from tmsopt.documents.analysis import Analysis
 from tmsopt.documents.blocks import (
     ALL,
@@ -91,6 +91,7 @@ def write_solution(
     yield _summarise(solution)
     analysis, scaled = solution.analysis, si or convert_to_si(solution)
     full, page, brief = full or level == "full", level == "page", level == "brief"
+    found = analysis.full_explanation if full else analysis.explanation
     yield Chapter("conflict" if solution.status == "infeasible" else "answer")
     yield from _write_answer(solution, analysis, brief, full)
     if page:
@@ -106,10 +107,10 @@ def write_solution(
     if solution.worst is not None:
         yield from _write_cases(solution, solution.worst)
     yield Chapter("limits", width="wide")
-    yield from _write_limits(solution, analysis, full, page)
+    yield from _write_limits(solution, found, full, page)
     if not brief:
         yield Chapter("sureness", "How sure it is")
-    yield from _write_sureness(solution, analysis, brief, full)
+    yield from _write_sureness(solution, found, brief, full)
     if brief:
         yield _suggest_more(solution, analysis)
         return
@@ -252,8 +253,7 @@ def _describe_case(of: Problem, case: Case) -> str:
     return ", ".join(at)
 
 
-def _write_limits(solution: Solution, analysis: Analysis, full: bool, page: bool) -> Parts:
-    found = analysis.full_explanation if full else analysis.explanation
+def _write_limits(solution: Solution, found: Explanation | None, full: bool, page: bool) -> Parts:
     names = dict.fromkeys((*solution.problem.constraints, *solution.violations))
     if page and names:
         rows = ((n, _describe_limit(solution, n), _describe_standing(solution, n)) for n in names)
@@ -302,13 +302,12 @@ def _list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
     return lever.name, limit, step, lever.gained.show(lever.predicted, 3)
 
 
-def _write_sureness(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Parts:
-    robust = analysis.boundaries if full else analysis.robustness
+def _write_sureness(solution: Solution, found: Explanation | None, brief: bool, full: bool) -> Parts:
+    robust = solution.analysis.boundaries if full else solution.analysis.robustness
     if robust is not None:
         yield Sentence(describe_robustness(robust, solution.stability.on_edge), "robustness")
         if full:
             yield tabulate_boundaries(robust)
-    found = analysis.explanation
     if found is not None and found.precision:
         yield Sentence(describe_rounding(found), "rounding")
         if not brief:

@@ -123,7 +123,11 @@ def _write_facts(study: Study, found: Summary) -> Parts:
         yield f"{len(found.laws)} laws apply; greatest relative residual {value:.0e} ({label})"
     if found.product is not None:
         for name, words in _SHARES.items():
-            yield Sentence(_describe_share(getattr(found.product, name)), words)
+            share: Share = getattr(found.product, name)
+            low, high = share.interval
+            within = f"95 % interval {100 * low:.3g} to {100 * high:.3g} %"
+            said = f"{share.count} of {share.of} ({100 * share.share:.3g} %; {within})" if share.of else "no row so far"
+            yield Sentence(said, words)
         values = found.clocked.get("quantiles", tuple(found.product.abscissa.values()))
         each = zip(found.product.abscissa, values, strict=True)
         at = ", ".join(f"{100 * float(q):g} % {Cell(value, digits=_DIGITS)}" for q, value in each)
@@ -133,12 +137,3 @@ def _write_facts(study: Study, found: Summary) -> Parts:
     if len(found.causes) > _CAUSES:
         yield f"… and {len(found.causes) - _CAUSES} other causes"
     yield from study.notes
-
-
-def _describe_share(share: Share) -> str:
-    if not share.of:
-        return "no row so far"
-    low, high = share.interval
-    return (
-        f"{share.count} of {share.of} ({100 * share.share:.3g} %; 95 % interval {100 * low:.3g} to {100 * high:.3g} %)"
-    )
