@@ -311,7 +311,6 @@ def test_files_are_written_whole():
         "tmsopt.charts.folder.sync",
         "tmsopt.charts.folder._create",  # recorded last
         "tmsopt.files.write_atomic",  # itself
-        "tmsopt.documents.html._draw_thumbnail",
         "tmsopt.documents.html._save_image",
         "tmsopt.plots.style.render",  # in memory
         "tmsopt.killable.serve",  # a pipe

@@ -14,7 +14,7 @@ import pytest
 from matplotlib.axes import Axes
 
 import tmsopt
-from tmsopt.documents import HOME, maker_of
+from tmsopt.documents import HOME, picture_of
 from tmsopt.models import from_coefficients
 
 mpl.use("Agg")
@@ -170,7 +170,7 @@ def test_it_is_drawn_into_axes(name):
         with pytest.raises(tmsopt.InputError, match=f"no picture of a {name} alone"):
             result.plot()
         return
-    draw = getattr(tmsopt.plots, maker_of(result).picture, None)
+    draw = getattr(tmsopt.plots, picture_of(result), None)
     if draw is None or "ax" in list(inspect.signature(draw).parameters)[:1]:
         pytest.skip("nothing draws it yet")
     assert isinstance(result.plot(), Axes)
@@ -201,7 +201,7 @@ def test_new_figures_are_shown_by_pyplot(monkeypatch):
         ax.plot([0, 1], [0, 1])
         return ax
 
-    monkeypatch.setattr(tmsopt.plots, maker_of(design()).picture, draws, raising=False)
+    monkeypatch.setattr(tmsopt.plots, picture_of(design()), draws, raising=False)
     before = plt.get_fignums()
     ax = design().plot()
     assert plt.gcf() is ax.get_figure()
@@ -227,7 +227,7 @@ def test_a_picture_that_fails_does_not_break_the_page(monkeypatch):
         raise RuntimeError
 
     whole = str(design())
-    monkeypatch.setattr(tmsopt.plots, maker_of(design()).picture, fails, raising=False)
+    monkeypatch.setattr(tmsopt.plots, picture_of(design()), fails, raising=False)
     assert "img" not in Page(design()._repr_html_()).tags
     assert str(design()) == whole
 

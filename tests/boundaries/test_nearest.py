@@ -370,13 +370,13 @@ def test_an_oscillator_without_damping_is_on_the_edge(m, c, k, edges, zeros):
 def test_what_a_change_does_is_said_in_the_words_of_a_model():
     """c = 0 is the nearest edge of m = 1, c = 0.1, k = 2, at 100 % like the others; of a bicycle it is weave."""
     assert describe_robustness(robustness(oscillator(1.0, 0.1, 2.0), weights={"c": 1.0})) == (
-        "a change of 0.1 in the weights makes it unstable (flutter)"
+        "a change of 0.1 times the weights makes it unstable (flutter)"
     )
     assert describe_robustness(robustness(oscillator(1.0, 0.1, 2.0), weights={"k": 1.0})).endswith(
         "makes it unstable (divergence)"
     )
     assert describe_robustness(robustness(oscillator(1.0, -0.1, 2.0), weights={"c": 0.05})) == (
-        "not stable; a change of 2 in the weights makes it stable"
+        "not stable; a change of 2 times the weights makes it stable"
     )
     assert describe_robustness(robustness(problem(FORWARD), weights={"Fr": FORWARD["Fr"]})).endswith(
         "makes it unstable (weave)"

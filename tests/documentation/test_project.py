@@ -38,33 +38,11 @@ def test_the_citation_has_what_the_format_asks_for():
     assert CITED["cff-version"] == "1.2.0"
     assert {"message", "title", "authors"} <= set(CITED)
     assert CITED["type"] == "software"
-    known = {
-        "abstract",
-        "authors",
-        "cff-version",
-        "commit",
-        "contact",
-        "date-released",
-        "doi",
-        "identifiers",
-        "keywords",
-        "license",
-        "license-url",
-        "message",
-        "preferred-citation",
-        "references",
-        "repository",
-        "repository-artifact",
-        "repository-code",
-        "title",
-        "type",
-        "url",
-        "version",
-    }
-    assert set(CITED) <= known
+    known = """abstract authors cff-version commit contact date-released doi identifiers keywords license license-url
+        message preferred-citation references repository repository-artifact repository-code title type url version"""
+    assert set(CITED) <= set(known.split())
     assert len(set(CITED["keywords"])) == len(CITED["keywords"]) > 0
-    for author in CITED["authors"]:
-        assert set(author) == {"name"}
+    assert all(set(author) == {"name"} for author in CITED["authors"])
 
 
 @pytest.mark.parametrize("reference", CITED["references"], ids=lambda r: r["title"][:30])
@@ -97,7 +75,7 @@ def test_the_page_cites_the_same():
 
 
 def test_the_change_log_keeps_its_form():
-    """Newest first, each version once, with its date, and its changes by their kind, in one order."""
+    """Newest first, this version, each once, with its date, and its changes by their kind, in one order."""
     heads = re.findall(r"^## (.*)$", CHANGES, re.MULTILINE)
     assert heads[0] == "[Unreleased]"
     versions = [re.fullmatch(r"\[(\d+)\.(\d+)\.(\d+)\] - (\d{4}-\d\d-\d\d)", head) for head in heads[1:]]
@@ -111,9 +89,6 @@ def test_the_change_log_keeps_its_form():
         found = re.findall(r"^### (.*)$", part, re.MULTILINE)
         assert set(found) <= set(kinds)
         assert len(set(found)) == len(found)
-
-
-def test_the_newest_version_is_this_one():
     newest = re.findall(r"^## \[(\d\S*)\] - (\S+)$", CHANGES, re.MULTILINE)[0]
     assert newest == (tmsopt.__version__, str(CITED["date-released"]))
 
@@ -177,11 +152,9 @@ def test_the_gate_runs_on_every_python_that_is_promised():
 
 
 def test_the_gate_is_the_one_that_is_run_here():
+    """Also the build of the documentation, which is as CONTRIBUTING says."""
     assert GATE["jobs"]["gate"]["steps"][-1] == {"run": ".ci/run"}
     assert os.access(ROOT / ".ci" / "run", os.X_OK)
-
-
-def test_the_documentation_is_built_as_contributing_says():
     command = "sphinx-build -nW docs build/docs"
     assert f'pip install -e ".[docs]" && {command}' in [step.get("run") for step in GATE["jobs"]["docs"]["steps"]]
     assert command in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -216,21 +189,9 @@ def test_hooks_run_what_the_extra_dev_brings():
         assert command == "python" or re.search(rf"\b{command}\b", brought), command
 
 
-@pytest.mark.parametrize(
-    ("text", "status"),
-    [
-        ("a\n", 0),
-        ("", 0),
-        ("a\n\nb\n", 0),
-        ("a", 1),
-        ("a \n", 1),
-        ("a\n\n", 1),
-        ("a\r\n", 1),
-        ("\tb\n", 0),
-        ("a\t\n", 1),
-    ],
-)
-def test_blanks_are_found(tmp_path, text, status):
+@pytest.mark.parametrize("text", ["a\n", "", "a\n\nb\n", "\tb\n", "a", "a \n", "a\n\n", "a\r\n", "a\t\n"])
+def test_blanks_are_found(tmp_path, text):
+    status = int(text not in ("a\n", "", "a\n\nb\n", "\tb\n"))
     (entry,) = (hook["entry"] for hook in HOOKS if hook["id"] == "blanks")
     file = tmp_path / "a.txt"
     file.write_bytes(text.encode())

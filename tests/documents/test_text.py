@@ -15,7 +15,7 @@ CODES = re.compile(r"\x1b\[[\d;]*m")
 
 
 def page(*blocks, level="brief"):
-    return Document("Solution", "a title", (), level, (Chapter("answer", blocks),))
+    return Document("Solution", "a title", (), level, (Chapter("answer", blocks=blocks),))
 
 
 def lines(*blocks, width=100, **options):

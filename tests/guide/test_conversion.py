@@ -6,10 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 import tmsopt
-from tmsopt.cli import every as main
 from tmsopt.guide import converted_file
 
 PROBLEMS = Path("problems")
@@ -61,10 +59,7 @@ def test_without_inertia_the_answer_is_that_of_the_law():
 @pytest.mark.slow
 def test_without_inertia_the_robot_is_the_same(tmp_path):
     """An EP4 in √(g/w) and in 1/s: the models are one, so are the optima, within what two searches agree to."""
-    file = tmp_path / "same.toml"
-    text = converted_file(ROBOT, inertia="none")
-    file.write_text(text)
-    old, new = tmsopt.solve(ROBOT), tmsopt.solve(file)
+    old, new = tmsopt.solve(ROBOT), tmsopt.solve(file_of(tmp_path, converted_file(ROBOT, inertia="none")))
     assert new.problem.model is tmsopt.models.whipple
     assert new.structure == old.structure == "EP4"
     assert new.abscissa == pytest.approx(old.abscissa * RATE, rel=1e-9)
@@ -76,9 +71,7 @@ def test_without_inertia_the_robot_is_the_same(tmp_path):
 def test_each_file_in_si_has_the_same_designs(name, tmp_path):
     """Every limit and objective has the same value at the same design, the abscissa in √(g/w) where it is written so."""
     old = tmsopt.load(PROBLEMS / f"{name}.toml").posed
-    file = tmp_path / "new.toml"
-    file.write_text(converted_file(old, inertia="none"), encoding="utf-8")
-    new = tmsopt.load(file).posed
+    new = tmsopt.load(file_of(tmp_path, converted_file(old, inertia="none"))).posed
     assert (new.free, new.tolerances, new.scenarios, new.title) == (old.free, old.tolerances, old.scenarios, old.title)
     assert new.units == {n: u for n, u in old.units.items() if n in new.units}
     middle = old.ordered({n: (0.4 * low + 0.6 * high) for n, (low, high) in old.free.items()})
@@ -117,9 +110,7 @@ def test_all_that_a_file_says_is_kept(tmp_path):
     text = converted_file(old)
     assert 'm_H = "3000 g"' in text
     assert 'x_H = "10/9 m"' in text
-    file = tmp_path / "new.toml"
-    file.write_text(text, encoding="utf-8")
-    new = tmsopt.load(file)
+    new = tmsopt.load(file_of(tmp_path, text))
     assert new.model.name == "whipple"
     assert new.fixed["k_phi"] == -2
     assert new.posed.typed(new.fixed)["x_H"] == "10/9"
@@ -163,16 +154,14 @@ def test_what_is_no_bicycle_of_masses_in_si_is_refused(name, words, tmp_path):
         tmsopt.convert(given)
 
 
-def test_command_writes_a_new_file_only(tmp_path):
-    runner, output = CliRunner(), tmp_path / "boxes.toml"
-    command = ["convert", str(ROBOT), "--to", "whipple", "--inertia", "boxes", "-o", str(output)]
-    assert runner.invoke(main, command).exit_code == 0
+def test_command_writes_a_new_file_only(tmp_path, run):
+    output, command = tmp_path / "boxes.toml", ("convert", ROBOT, "--to", "whipple", "--inertia", "boxes")
+    assert run(*command, "-o", output)[0] == 0
     data = tomllib.loads(output.read_text())
     assert data["model"] == "whipple"
     assert (tmp_path / "tmsopt.schema.json").is_file()
     output.write_text("mine")
-    again = runner.invoke(main, command)
-    assert (again.exit_code, output.read_text()) == (2, "mine")
-    assert "boxes.toml" in again.stderr
-    printed = runner.invoke(main, command[:-2])
-    assert tomllib.loads(printed.stdout) == data
+    status, _, said = run(*command, "-o", output)
+    assert (status, output.read_text()) == (2, "mine")
+    assert "boxes.toml" in said
+    assert tomllib.loads(run(*command)[1]) == data

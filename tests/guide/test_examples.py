@@ -5,46 +5,50 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 import tmsopt
-from tmsopt.cli import every
 from tmsopt.guide import STARTS, companions, example, examples, new_problem
 
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.fixture
+def file_of(tmp_path):
+    """Writes a file to be read."""
+
+    def write(text):
+        (tmp_path / "new.toml").write_text(text, encoding="utf-8")
+        return tmp_path / "new.toml"
+
+    return write
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", STARTS)
-def test_a_new_problem_solves_as_it_stands(kind, tmp_path):
-    file = tmp_path / "new.toml"
-    file.write_text(new_problem(kind), encoding="utf-8")
-    design = tmsopt.solve(file)
+def test_a_new_problem_solves_as_it_stands(kind, file_of):
+    design = tmsopt.solve(file_of(new_problem(kind)))
     assert design.status == "optimal"
     assert design.abscissa < 0
     assert max(map(len, new_problem(kind).splitlines())) <= 100
 
 
 @pytest.mark.parametrize("kind", STARTS)
-def test_a_new_problem_solves_with_every_hint_taken(kind, tmp_path):
+def test_a_new_problem_solves_with_every_hint_taken(kind, file_of):
     """What its comments offer instead of the objective reads as well."""
-    file = tmp_path / "new.toml"
     text = new_problem(kind)
     offered = [line[1:].split("  ")[1].strip() for line in text.splitlines() if line.startswith("#   ")]
     assert len(offered) >= 2
     for line in offered:
-        file.write_text(text.replace('minimize = "abscissa"\n', f"{line}\n"), encoding="utf-8")
+        file = file_of(text.replace('minimize = "abscissa"\n', f"{line}\n"))
         assert tmsopt.load(file).posed.sense == line.split(" = ")[0]
 
 
-def test_the_tables_that_the_new_robot_offers_are_read(tmp_path):
+def test_the_tables_that_the_new_robot_offers_are_read(file_of):
     text = new_problem("tms")
     offer = text.index("# [scenarios]")
     uncommented = "\n".join(line.removeprefix("# ") for line in text[offer:].splitlines())
     kept = "\n".join(line for line in text[:offer].splitlines() if not line.startswith("v = "))
-    file = tmp_path / "new.toml"
-    file.write_text(f"{kept}\n{uncommented}\n", encoding="utf-8")
-    problem = tmsopt.load(file)
+    problem = tmsopt.load(file_of(f"{kept}\n{uncommented}\n"))
     assert (set(problem.scenarios), set(problem.tolerances)) == ({"v"}, {"x_B", "lambda_s"})
 
 
@@ -93,16 +97,16 @@ def test_what_a_file_refers_to_comes_with_it():
             assert not isinstance(refers, str) or refers in companions(example(name))
 
 
-def test_a_problem_that_names_a_bicycle_comes_with_all_of_them(tmp_path):
+def test_a_problem_that_names_a_bicycle_comes_with_all_of_them(tmp_path, run):
     file = tmp_path / "mine.toml"
-    said = CliRunner().invoke(every, ["example", "smallest_change", "--output", str(file)])
-    assert (said.exit_code, said.stderr.count("wrote")) == (0, 3)  # the file, the schema, the folder
+    status, _, said = run("example", "smallest_change", "--output", file)
+    assert (status, said.count("wrote")) == (0, 3)  # the file, the schema, the folder
     written, kept = ({p.name for p in (folder / "bicycles").iterdir()} for folder in (tmp_path, ROOT / "problems"))
     assert written == kept
     assert tmsopt.load(file).fixed == tmsopt.load(ROOT / "problems/smallest_change.toml").fixed
     mine = tmp_path / "bicycles/fisher.txt"
     mine.write_text("mine")
     (tmp_path / "bicycles/silver.txt").unlink()
-    assert CliRunner().invoke(every, ["example", "smallest_gains", "-o", str(tmp_path / "b.toml")]).exit_code == 0
+    assert run("example", "smallest_gains", "-o", tmp_path / "b.toml")[0] == 0
     assert mine.read_text() == "mine"
     assert (tmp_path / "bicycles/silver.txt").exists()

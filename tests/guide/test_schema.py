@@ -39,11 +39,6 @@ def test_every_example_refers_to_it_and_fits(path):
     assert faults(text) == []
 
 
-@pytest.mark.parametrize("kind", STARTS)
-def test_every_new_problem_fits(kind):
-    assert faults(new_problem(kind)) == []
-
-
 GOOD = """model = "tms"
 [parameters]
 w = "80 cm"
@@ -128,8 +123,8 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("text", [GOOD, STEERED, STUDY, OWN])
-def test_what_they_are_made_from_fits(text):
+@pytest.mark.parametrize("text", [GOOD, STEERED, STUDY, OWN, *map(new_problem, STARTS)])
+def test_what_they_are_made_from_fits_and_every_new_problem(text):
     assert faults(text) == []
 
 
@@ -156,8 +151,7 @@ def test_parameters_are_explained_by_their_meanings():
 
 
 def test_every_key_is_explained():
-    problem = SCHEMA["$defs"]["problem"]["properties"]
-    study = SCHEMA["$defs"]["study_file"]["properties"]
+    problem, study = (SCHEMA["$defs"][name]["properties"] for name in ("problem", "study_file"))
     inner = (problem, study, problem["objective"]["properties"], study["study"]["properties"])
     assert [key for keys in inner for key, found in keys.items() if not found.get("description")] == []
 

@@ -132,7 +132,7 @@ class ConvertCommand(WithToml, OnFile):
     front: str | None = option("Size of the front assembly, e.g. 10x10x30cm.")
 
     def run(self) -> None:
-        text = guide.converted_file(self.file, self.to, self.inertia, self.body, self.front)
+        text = guide.converted_file(self.file, **self.select("to inertia body front"))
         print_or_write(text, self.output)
 
 

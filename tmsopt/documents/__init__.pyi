@@ -9,7 +9,7 @@ from .paper import write_ledger_page as write_ledger_page
 from .proofs import list_numbers as list_numbers
 from .results import (
     HOME as HOME, analyse as analyse, document_of as document_of, draw as draw, to_notebook as to_notebook,
-    headline as headline, maker_of as maker_of, plot as plot, report as report, response as response,
+    headline as headline, picture_of as picture_of, plot as plot, report as report, response as response,
     save_report as save_report,
 )
 from .robustness import describe_robustness as describe_robustness

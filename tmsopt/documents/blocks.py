@@ -1,8 +1,8 @@
 """A result as a document: sections of a few kinds of blocks. Renderers know these kinds, and no result."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable, Iterator, Sequence, Sized
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
 
 from tmsopt.problem.unit_system import Unit
 
@@ -44,6 +44,9 @@ class Cell:
         return f"{number} {self.unit.text}" if self.named and self.unit.text and number != "none" else number
 
 
+Row = Sequence[Cell | str]
+
+
 @dataclass(frozen=True)
 class Sentence:
     """A sentence, under a label where it is one of several facts."""
@@ -76,7 +79,7 @@ class TableBlock:
         fold: rows from which a table without headings stands in several columns, where there is room.
     """
 
-    rows: Sequence[Sequence[Cell | str]]
+    rows: Sequence[Row]
     caption: str = ""
     needs: Sequence[int] = ()
     most: int | None = None
@@ -93,9 +96,14 @@ class TableBlock:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture, drawn where it is shown."""
+    """A picture, drawn where it is shown.
 
-    draw: "Callable[[], Axes | Drawing]"
+    Attributes:
+        draw: of a result, which it gets without its titles: they stand above its pictures already.
+    """
+
+    draw: "Callable[[Any], Axes | Drawing]"
+    result: Any
     caption: str
 
 
@@ -118,12 +126,13 @@ class Chapter:
         name: by which a page links to it.
         heading: in words; by default the name.
         width: how much of a page it takes: a column, ``wide`` or ``whole``.
+        blocks: those that follow it, until the next chapter.
     """
 
     name: str
-    blocks: tuple[Block, ...]
     heading: str = ""
     width: str = ""
+    blocks: tuple[Block, ...] = ()
 
     @property
     def title(self) -> str:
@@ -153,12 +162,27 @@ class Document:
     title: str
     words: tuple[Badge, ...]
     level: Level
-    sections: tuple[Chapter, ...] = field(default=())
+    sections: tuple[Chapter, ...] = ()
 
 
-def count_things(count: int, one: str, many: str = "") -> str:
+Parts = Iterator[tuple[Badge | str, ...] | Chapter | Block | str]
+"""A document in the order in which it is read: its words, then chapters, each before its blocks; a text is a sentence.
+
+Empty words and sentences are left out, and the words of a result that is a part of another one.
+"""
+
+
+def count_things(things: Sized | int, one: str, many: str = "") -> str:
     """A number of things in words, such as ``2 branches``."""
+    count = things if isinstance(things, int) else len(things)
     return f"{count} {one if count == 1 else many or one + 's'}"
+
+
+def judge(holds: bool | None, text: str) -> Badge:
+    """A verdict: a text, or that it is not so; empty where it is not known."""
+    if holds is None:
+        return Badge("")
+    return Badge(text, "good") if holds else Badge(f"not {text}", "bad")
 
 
 def say_whether(value: bool | None) -> str:

@@ -1,58 +1,67 @@
-"""Traces with their branches, domains, and swallowtails: what is on them, and where their events are."""
+"""Traces with their branches, charts, domains and swallowtails: what is drawn over parameters."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
-from tmsopt.documents.blocks import ALL, Badge, Block, Cell, Chapter, Figure, Level, Sentence, TableBlock, count_things
-from tmsopt.documents.maker import Maker, remove_titles
-from tmsopt.documents.tables import format_value, thin_rows, write_question
+from tmsopt import plots
+from tmsopt.charts.chart import Chart
+from tmsopt.documents.blocks import (
+    ALL,
+    Cell,
+    Chapter,
+    Figure,
+    Level,
+    Parts,
+    Row,
+    Sentence,
+    TableBlock,
+    count_things,
+)
+from tmsopt.documents.tables import MOST, format_value, thin_rows, write_question
 from tmsopt.models import Model, in_words_of
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import Unit, common_unit, unit_of
+from tmsopt.roots import CLASSES
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 from tmsopt.tracing.domain import Domain
 from tmsopt.tracing.swallowtail import Swallowtail
 
+_POINTS = 800 * 800  # of a chart that a picture shows
 _SHORT = 6  # digits of a point on a page
 _ROUNDING = 1e-14  # mismatch of a coefficient at which a point has them all
 _FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
 
 
-def summarise_trace(trace: Trace) -> Iterator[Badge]:
-    """Pattern, branches, points, events."""
-    yield Badge(trace.pattern)
-    yield Badge(count_things(len(trace.branches), "branch", "branches"))
-    yield Badge(count_things(trace.points, "point"))
-    yield Badge(count_things(len(trace.events), "event"))
-
-
-def write_trace(trace: Trace, level: Level) -> Iterator[Chapter]:
+def write_trace(trace: Trace, level: Level) -> Parts:
     """Branches with their events, in the free parameters."""
+    counts = count_things(trace.points, "point"), count_things(trace.events, "event")
+    yield trace.pattern, count_things(trace.branches, "branch", "branches"), *counts
     problem, model = trace.problem.posed, trace.problem.model
-    yield Chapter("answer", (Sentence(describe_trace(trace), tone="answer"),))
+    yield Sentence(describe_trace(trace), tone="answer")
     if level == "page":
-        from tmsopt import plots
-
-        caption = f"Branches of {in_words_of(model, trace.pattern)}"
-        yield Chapter("picture", (Figure(lambda: plots.draw_trace(remove_titles(trace)), caption),), "Branches")
+        yield Chapter("picture", "Branches")
+        yield Figure(plots.draw_trace, trace, f"Branches of {in_words_of(model, trace.pattern)}")
     units = {n: common_unit(problem, n) for n in (*trace.problem.free, "abscissa")}
     for number, branch in enumerate(trace.branches, start=1):
-        events = TableBlock(list_events(branch, units, model), f"Events along branch {number}, to all digits")
-        blocks = (Sentence(_describe_branch(branch, trace), f"branch {number}"), events)
-        yield Chapter(f"branch-{number}", blocks, f"Branch {number}", "whole")
+        yield Chapter(f"branch-{number}", f"Branch {number}", "whole")
+        yield Sentence(_describe_branch(branch, trace), f"branch {number}")
+        yield TableBlock(list_events(branch, units, model), f"Events along branch {number}, to all digits")
     if level == "page":
-        yield write_question(problem)
-        yield _tabulate_points(trace)
+        yield from write_question(problem)
+        yield from _tabulate_points(trace)
 
 
 def describe_trace(trace: Trace) -> str:
     """How many branches and points, and what they took."""
     per_point = 1e6 * trace.seconds_walking / max(trace.points, 1)
     points = f", {trace.points} points, {per_point:.0f} µs per point" if trace.points else ""
-    count = count_things(len(trace.branches), "branch", "branches")
+    count = count_things(trace.branches, "branch", "branches")
     pattern = in_words_of(trace.problem.model, trace.pattern)
     return f"{pattern}: {count}{points}, found from {trace.starts} starts; {trace.seconds:.2f} s"
 
@@ -69,16 +78,14 @@ def _describe_branch(branch: Branch, trace: Trace) -> str:
     return f"{kinds}, {len(branch)} points, {form}, {states}, coefficient error {branch.residual:.0e}{doubt}"
 
 
-def list_events(branch: Branch, units: Mapping[str, Unit], model: Model | None = None) -> list[Sequence[Cell | str]]:
+def list_events(branch: Branch, units: Mapping[str, Unit], model: Model | None = None) -> list[Row]:
     """Headings, and the cells of each event, to as many digits as its coefficients are met, in these units."""
-    heads = (f"{n} {unit.text}".rstrip() for n, unit in units.items())
-    rows: list[Sequence[Cell | str]] = [("event", *heads, "at")]
+    rows: list[Row] = [("event", *_head_columns(units), "at")]
     for event in branch.events:
         found = {**event.parameters, "abscissa": float(branch.abscissa[event.index])}
         # a point may be off by some times the residual of its coefficients: two digits less than that
         digits = min(max(math.floor(-math.log10(max(event.residual, _ROUNDING))) - 2, 2), ALL)
-        numbers = (Cell(found[n], unit, digits) for n, unit in units.items())
-        rows.append((name_kind(model, event.name), *numbers, event.detail))
+        rows.append((name_kind(model, event.name), *_list_numbers(found, units, digits), event.detail))
     return rows
 
 
@@ -87,7 +94,15 @@ def name_kind(model: Model | None, name: str) -> str:
     return in_words_of(model, name) if model else name
 
 
-def _tabulate_points(trace: Trace) -> Chapter:
+def _head_columns(units: Mapping[str, Unit]) -> Iterator[str]:
+    return (f"{n} {unit.text}".rstrip() for n, unit in units.items())
+
+
+def _list_numbers(values: Mapping[str, float], units: Mapping[str, Unit], digits: int = ALL) -> Iterator[Cell]:
+    return (Cell(values[n], unit, digits) for n, unit in units.items())
+
+
+def _tabulate_points(trace: Trace) -> Parts:
     """Points of all branches with their events, in the units of the problem."""
     units = {n: unit_of(trace.problem.posed, n) for n in (*trace.problem.free, "abscissa")}
     model = trace.problem.model
@@ -96,46 +111,36 @@ def _tabulate_points(trace: Trace) -> Chapter:
     records = [*trace.records()]
     marked = [k for k, record in enumerate(records) if record["event"]]
     kept, note = thin_rows(records, "points", "tmsopt trace FILE --csv curve.csv writes all", marked)
-    rows: list[Sequence[Cell | str]] = [("branch", *(f"{n} {u.text}".rstrip() for n, u in units.items()), *facts)]
+    rows: list[Row] = [("branch", *_head_columns(units), *facts)]
     for record in kept:
-        numbers = (Cell(record[n], unit, _SHORT) for n, unit in units.items())
         said = (in_words_of(model, format_value(record[fact.replace(" ", "_")])) for fact in facts)
-        rows.append((str(record["branch"] + 1), *numbers, *said))
-    return Chapter("rows", (*note, TableBlock(rows, "Points of the branches")), "Points", "whole")
+        rows.append((str(record["branch"] + 1), *_list_numbers(record, units, _SHORT), *said))
+    yield Chapter("rows", "Points", "whole")
+    yield from note
+    yield TableBlock(rows, "Points of the branches")
 
 
-def summarise_branch(branch: Branch) -> Iterator[Badge]:
-    """The same of one branch."""
-    yield Badge(branch.pattern)
-    yield Badge(count_things(len(branch), "point"))
-    yield Badge(count_things(len(branch.events), "event"))
-    yield Badge("closed" if branch.closed else "open")
-
-
-def write_branch(branch: Branch, _level: Level) -> Iterator[Chapter]:
+def write_branch(branch: Branch, _level: Level) -> Parts:
     """One branch with its events, in the free parameters."""
     form = "closed" if branch.closed else "open"
+    yield branch.pattern, count_things(branch, "point"), count_things(branch.events, "event"), form
     found = f"{branch.pattern}: {len(branch)} points, {form}, coefficient error {branch.residual:.0e}"
-    yield Chapter("answer", (Sentence(found, tone="answer"),))
+    yield Sentence(found, tone="answer")
+    yield Chapter("events")
     units = dict.fromkeys((*branch.tangent, "abscissa"), Unit())
-    yield Chapter("events", (TableBlock(list_events(branch, units), "Events along the branch"),))
+    yield TableBlock(list_events(branch, units), "Events along the branch")
 
 
-def summarise_domain(domain: Domain) -> Iterator[Badge]:
-    """How many arcs and corners."""
-    yield Badge(f"stability: {count_things(len(domain.stability), 'arc')}")
-    yield Badge(f"heavy damping: {count_things(len(domain.heavy_damping), 'arc')}")
-    yield Badge(count_things(len(domain.corners), "corner"))
-
-
-def write_domain(domain: Domain, _level: Level) -> Iterator[Chapter]:
+def write_domain(domain: Domain, _level: Level) -> Parts:
     """What bounds stability and heavy damping, and the corners."""
-    yield Chapter("answer", tuple(describe_domain(domain)))
-    if domain.corners:
-        yield Chapter("corners", (tabulate_corners(domain),))
+    stability, damping = (count_things(arcs, "arc") for arcs in (domain.stability, domain.heavy_damping))
+    yield f"stability: {stability}", f"heavy damping: {damping}", count_things(domain.corners, "corner")
+    yield from describe_domain(domain)
+    yield Chapter("corners")
+    yield from tabulate_corners(domain)
 
 
-def describe_domain(domain: Domain, problem: Posed | None = None) -> Iterator[Block]:
+def describe_domain(domain: Domain, problem: Posed | None = None) -> Iterator[str]:
     """What bounds stability and heavy damping."""
     model = problem.model if problem else None
     bounded = [("stability", domain.stability)]
@@ -149,46 +154,106 @@ def describe_domain(domain: Domain, problem: Posed | None = None) -> Iterator[Bl
             f"{kind} ({f'{len(sizes)} curves, ' if len(sizes) > 1 else ''}{sum(sizes)} points)"
             for kind, sizes in points.items()
         ]
-        yield Sentence(f"{name} is bounded by {', '.join(kinds) or 'nothing in the box'}")
+        yield f"{name} is bounded by {', '.join(kinds) or 'nothing in the box'}"
 
 
-def tabulate_corners(domain: Domain, problem: Posed | None = None) -> TableBlock:
-    """Each corner to all digits, in the units of the problem where it is known."""
+def tabulate_corners(domain: Domain, problem: Posed | None = None) -> Iterator[TableBlock]:
+    """Each corner to all digits, in the units of the problem where it is known; nothing without corners."""
+    if not domain.corners:
+        return
     model = problem.model if problem else None
-    names = list(domain.corners[0].parameters) if domain.corners else []
-    names = [n for n in names if any(n in arc.points for arc in (*domain.stability, *domain.heavy_damping))]
-    units = {n: unit_of(problem, n) if problem else Unit() for n in names}
-    head = ("corner", *(f"{n} {u.text}".rstrip() for n, u in units.items()))
-    rows: list[Sequence[Cell | str]] = [head]
-    for c in domain.corners:
-        rows.append((name_kind(model, c.name), *(Cell(c.parameters[n], u) for n, u in units.items())))
-    return TableBlock(rows, "Corners of the domains")
+    names = {n for arc in (*domain.stability, *domain.heavy_damping) for n in arc.points}
+    units = {n: unit_of(problem, n) if problem else Unit() for n in domain.corners[0].parameters if n in names}
+    rows: list[Row] = [(name_kind(model, c.name), *_list_numbers(c.parameters, units)) for c in domain.corners]
+    yield TableBlock((("corner", *_head_columns(units)), *rows), "Corners of the domains")
 
 
-def summarise_swallowtail(found: Swallowtail) -> Iterator[Badge]:
-    """Axes and pieces."""
-    yield Badge(" ".join(found.axes))
-    yield Badge(count_things(len(found.patches), "patch", "patches"))
-    yield Badge(f"edges: {count_things(len(found.cusps.branches), 'EP3 curve')}")
-
-
-def write_swallowtail(found: Swallowtail, _level: Level) -> Iterator[Chapter]:
+def write_swallowtail(found: Swallowtail, _level: Level) -> Parts:
     """Pieces of the surface, then its edges as traces."""
+    edges = f"edges: {count_things(found.cusps.branches, 'EP3 curve')}"
+    yield " ".join(found.axes), count_things(found.patches, "patch", "patches"), edges
     damped = sum(patch.heavily_damped for patch in found.patches)
     pieces = f"{len(found.patches)} patches, {damped} of them bound heavy damping"
-    yield Chapter(
-        "answer",
-        (
-            Sentence(f"real negative double roots over {', '.join(found.axes)}: {pieces}", tone="answer"),
-            Sentence(describe_trace(found.cusps), "cuspidal edges"),
-            Sentence(describe_trace(found.crossing), "self-intersection"),
-        ),
-    )
+    yield Sentence(f"real negative double roots over {', '.join(found.axes)}: {pieces}", tone="answer")
+    yield Sentence(describe_trace(found.cusps), "cuspidal edges")
+    yield Sentence(describe_trace(found.crossing), "self-intersection")
 
 
-MAKERS: Mapping[str, Maker] = {
-    "Trace": Maker(summarise_trace, write_trace, "draw_trace"),
-    "Branch": Maker(summarise_branch, write_branch),
-    "Domain": Maker(summarise_domain, write_domain, "draw_domain"),
-    "Swallowtail": Maker(summarise_swallowtail, write_swallowtail, "draw_swallowtail"),
-}
+def write_chart(chart: Chart, level: Level) -> Parts:
+    """The classes with their shares, the best grid point, the boundaries of a plane in memory, and their corners."""
+    size, over = " × ".join(str(len(values)) for values in chart.grid), ", ".join(chart.axes)
+    most = sorted(chart.shares.items(), key=lambda item: -item[1])[:2]
+    yield f"{size} designs over {over}", *(f"{100 * share:.3g} % {name}" for name, share in most)
+    data: dict[str, Any] = chart.to_json()
+    problem = chart.problem.posed
+    plane = chart.path is None and len(chart.axes) == 2
+    over = " and ".join(chart.axes) if plane else over
+    yield Sentence(f"{size} designs over {over}", tone="answer")
+    yield Chapter("classes")
+    yield from _write_classes(chart, data, plane)
+    yield Chapter("best")
+    if best := data["least_abscissa"]:
+        where = ", ".join(f"{n} = {unit_of(problem, n).show(best[n], 6)}" for n in chart.axes)
+        value = common_unit(problem, "abscissa").show(best["value"], 6)
+        yield Sentence(f"{value} at {where}", "least abscissa on the grid", "answer")
+    if chart.domain is not None and plane:
+        yield Chapter("boundaries")
+        yield from describe_domain(chart.domain, problem)
+        yield from tabulate_corners(chart.domain, problem)
+    if data.get("designs"):
+        yield Chapter("speed")
+        yield f"{data['per_second']:.3g} designs per second with {data['engine']}"
+    if level == "page":
+        yield Chapter("picture", "Chart", "wide")
+        shown, axes = _thin_chart(chart, _POINTS), " and ".join(chart.axes)
+        yield Figure(plots.chart_figure, shown, f"Stability over {axes}")
+        yield Figure(partial(plots.chart_figure, layer="abscissa"), shown, f"Spectral abscissa over {axes}")
+        yield from write_question(problem)
+        yield from _tabulate_designs(chart)
+
+
+def _write_classes(chart: Chart, data: Mapping[str, Any], plane: bool) -> Parts:
+    rows = [(in_words_of(chart.problem.model, n), f"{100 * x:.2f}") for n, x in data["classes"].items() if x]
+    if rows:
+        yield TableBlock((("class", "share in %"), *rows), "Share of each class")
+    satisfied = data["satisfied"]
+    inequalities = len(chart.problem.constraints) > len(chart.left_aside) if plane else (satisfied or 1) < 1
+    if satisfied is not None and inequalities:
+        yield f"the constraints hold on {100 * satisfied:.2f} %"
+    for name in chart.left_aside if plane else ():
+        yield f"{name} is an equality, which holds on curves and not on a grid: left aside"
+
+
+def _tabulate_designs(chart: Chart) -> Parts:
+    """Designs of the grid, every so many along each axis where they are too many."""
+    problem, shown = chart.problem, _thin_chart(chart, MOST)
+    left_out = [] if len(problem.constraints) > len(chart.left_aside) else ["satisfied", "margin"]
+    left_out += [] if problem.model.carrier is None else ["damping_ratio", "real_roots"]  # eigenfrequencies have none
+    grid = reversed(np.meshgrid(*reversed(shown.grid), indexing="ij"))
+    layers = {n: layer for n, layer in shown.layers.items() if n not in left_out}
+    columns: dict[str, list[Cell | str]] = {}
+    for name, layer in (*zip(chart.axes, grid, strict=True), *layers.items()):
+        values = np.asarray(layer).ravel().tolist()
+        if name == "kind":
+            columns["class"] = [in_words_of(problem.model, CLASSES[k]) for k in values]
+        elif name in (*chart.axes, "abscissa"):
+            unit = unit_of(problem.posed, name)
+            columns[f"{name} {unit.text}".rstrip()] = [Cell(x, unit, 6) for x in values]
+        else:
+            columns[name.replace("_", " ")] = [format_value(x) for x in values]
+    yield Chapter("rows", "Designs", "whole")
+    rows = [tuple(columns), *zip(*columns.values(), strict=True)]
+    left = math.prod(map(len, chart.grid))
+    if len(rows) <= left:
+        yield f"{len(rows) - 1} of {left} designs, spread evenly over each axis; --output writes all."
+    yield TableBlock(rows, "Designs of the grid")
+
+
+def _thin_chart(chart: Chart, most: int) -> Chart:
+    """A chart with one in so many designs along each axis that there are no more than `most`."""
+    sizes = [len(values) for values in chart.grid]
+    step = next(k for k in range(1, max(sizes) + 1) if math.prod(-(-size // k) for size in sizes) <= most)
+    if step == 1:
+        return chart
+    layers = {n: layer[(slice(None, None, step),) * len(sizes)] for n, layer in chart.layers.items()}
+    return replace(chart, grid=tuple(values[::step] for values in chart.grid), layers=layers)

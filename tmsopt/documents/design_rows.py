@@ -7,87 +7,96 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tmsopt.documents.blocks import ALL, Cell
+from tmsopt.documents.blocks import ALL, Cell, Row, TableBlock
 from tmsopt.dynamics.speeds import speed_of
 from tmsopt.evaluation.recheck import FEASIBLE
-from tmsopt.models import GRAVITY, INERTIAS, Model, Parameter, ParameterSet, Quantity, Values, to_si
+from tmsopt.guide import describe
+from tmsopt.models import GRAVITY, INERTIAS, Parameter, Quantity, Values, to_si
 from tmsopt.models.user_spectrum import eigenfrequencies, roots_on_axis
 from tmsopt.problem.cases import Case
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit, show_at, unit_at, unit_of
 from tmsopt.problem.units import frequencies
 from tmsopt.problem.verdict.stability import ROUNDED
+from tmsopt.records import Numbers
 from tmsopt.roots import Root
 
-TableRow = Sequence[Cell | str]
-
+BRIEF = 5
+"""Digits of a number in a brief report."""
 NOTHING = 1e-14
 """Share of the size of a root, or of 1: less is rounding."""
 _OF_RANGE = 1e-12  # share of a range: less is rounding
-_PERCENT = Unit("%", 0.01)
+PERCENT = Unit("%", 0.01)
 
 
-def convert_to_si(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Mapping[str, float]:
+def convert_to_si(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Numbers:
     """SI parameters: as solved for, or of dimensionless skates for the given wheelbase, rear mass and gravity."""
     own = solution.problem.posed.parameter_set.rate is not None or len(solution.problem.model.sets) == 1
     return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
 
 
-def list_parameters(solution: Solution, si: Mapping[str, float], digits: int = ALL) -> list[TableRow]:
-    """Name, number, unit, role, what it is in the other set, and meaning of each parameter.
+def list_parameters(solution: Solution, si: Numbers, brief: bool = False) -> Iterator[tuple[str, Cell, str, str, str]]:
+    """Name, number, role, what it is in the other set, and meaning of each parameter.
 
     Parameters that are 0 by default are left out.
 
     Args:
         si: the parameters in SI; of a model without a dimensionless form those of the solution.
-        digits: of what it is in the other set.
+        brief: with few digits, each number with its unit.
     """
-    problem = solution.problem.posed
-    of, other = problem.parameter_set, _other_set(problem.model, problem.parameter_set)
-    values = {} if other is None else solution.dimensionless if other.rate is None else si
-    rows: list[TableRow] = []
-    for p in of.parameters:
-        x, how, unit = round_to_zero(solution, p.name), name_role(solution, p.name), unit_of(problem, p.name)
-        if how == "fixed" and x == 0 == p.default:
+    problem, digits = solution.problem.posed, BRIEF if brief else ALL
+    others = [s for s in problem.model.sets if s is not problem.parameter_set]
+    for p in problem.parameter_set.parameters:
+        x, (lower, upper) = solution.parameters[p.name], problem.free.get(p.name, (0.0, 0.0))
+        x = 0.0 if abs(x) <= _OF_RANGE * (upper - lower) else x
+        role = "free" if p.name in problem.free else "scenario" if p.name in problem.scenarios else "fixed"
+        if role == "fixed" and x == 0 == p.default:
             continue
-        twin = None if other is None else _find_counterpart(p, other)
-        also = "" if twin is None else _describe_twin(twin, values[twin.name], digits)
+        also = ""
+        for other in others:
+            values = solution.dimensionless if other.rate is None else si
+            for q in other.parameters if p.name not in other.names else ():
+                if p.counterpart == q.name or q.counterpart == p.name:
+                    also = also or _describe_twin(q, values[q.name], digits)
         meaning = "" if p.meaning == "parameter" else p.meaning
-        rows.append((p.name, Cell(x, unit), unit.text, how, also, meaning))
-    return rows
+        yield p.name, Cell(x, unit_of(problem, p.name), digits, named=brief), role, also, meaning
 
 
-def list_quantities(solution: Solution, si: Mapping[str, float]) -> list[TableRow]:
+def tabulate_parameters(solution: Solution, si: Numbers) -> TableBlock:
+    """Every parameter with its role, its range, what it is in the other set, and its meaning."""
+    ranges = {w.name: w.given for of in describe(solution).sets for w in of.parameters}
+    other = "without units" if solution.problem.posed.parameter_set.rate is not None else "in SI"
+    rows: list[Row] = [("parameter", "value", "unit", "free or fixed", "range", other, "meaning")]
+    for name, cell, role, also, meaning in list_parameters(solution, si):
+        rows.append((name, cell, cell.unit.text, role, ranges[name] if role == "free" else "", also, meaning))
+    return TableBlock(rows, "Parameters of the design")
+
+
+def list_quantities(solution: Solution, si: Numbers) -> Iterator[Row]:
     """Name, number, unit, the same in SI for a dimensionless one, and meaning of each quantity that exists."""
-    problem, found = solution.problem.posed, solution.quantities
+    problem = solution.problem.posed
     of = problem.parameter_set
-    rows: list[TableRow] = []
-    scaled = next((s for s in problem.model.sets if s.rate is not None), None)
-    values = Values(problem.model, scaled, si) if scaled is not None and scaled is not of else None
+    scaled = next((s for s in problem.model.sets if s.rate is not None and s is not of), None)
+    values = None if scaled is None else Values(problem.model, scaled, si)
     for q in (*problem.model.quantities, *of.quantities):
-        x = float(found.get(q.name, math.nan))
+        x = float(solution.quantities.get(q.name, math.nan))
         if not math.isfinite(x) or q.aside:
             continue
-        twin, unit = q.counterpart, _PERCENT if q.share else unit_of(problem, q.name)
+        cell = Cell(x, unit_of(problem, q.name))
+        if q.share:
+            cell = Cell(x if abs(x) > FEASIBLE else 0.0, PERCENT, 6)
+        twin = q.counterpart
         also = "" if twin is None or values is None else _describe_twin(twin, float(twin.value(values)))
-        cell = Cell(x if abs(x) > FEASIBLE else 0.0, unit, 6) if q.share else Cell(x, unit)
-        rows.append((q.name, cell, unit.text, also, q.meaning))
-    return rows
+        yield q.name, cell, cell.unit.text, also, q.meaning
 
 
-def round_to_zero(solution: Solution, name: str) -> float:
-    """A parameter; 0 where it differs from that by less than a rounding of its range."""
-    x, (lower, upper) = solution.parameters[name], solution.problem.free.get(name, (0.0, 0.0))
-    return 0.0 if abs(x) <= _OF_RANGE * (upper - lower) else x
+def list_cases(solution: Solution) -> list[Case]:
+    """The cases that the problem states, and the extreme ones that were found."""
+    stated = [case for case in solution.problem.posed.cases if not case.direction]
+    return stated + [case for case in (solution.worst, solution.least_damped, solution.fastest) if case is not None]
 
 
-def name_role(solution: Solution, name: str) -> str:
-    """``free``, ``scenario`` or ``fixed``."""
-    problem = solution.problem.posed
-    return "free" if name in problem.free else "scenario" if name in problem.scenarios else "fixed"
-
-
-def parameters_of_worst_case(solution: Solution) -> Mapping[str, float]:
+def parameters_of_worst_case(solution: Solution) -> Numbers:
     """The parameters in the case that roots and abscissa belong to: of a band the worst one, else the design's own."""
     return solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
 
@@ -100,10 +109,9 @@ def describe_motion(solution: Solution) -> str:
         return "no motion to describe: a root is at infinity"
     found = solution.stability
     growth = f"grows as {found.growth}{'' if solution.edge_is_exact else ROUNDED}"
+    lasts = growth if found.growth else "neither decay nor growth"
     if not found.on_edge:
         lasts = f"{'decay' if abscissa < 0 else 'growth'} time {time.show(1 / abs(abscissa), 4)}"
-    else:
-        lasts = growth if found.growth else "neither decay nor growth"
     if solution.problem.model.carrier is not None:
         edge = growth if found.growth else "neither loss nor gain"
         gain = f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({lasts})"
@@ -112,9 +120,9 @@ def describe_motion(solution: Solution) -> str:
     swings = [f for f in frequencies(solution.roots, rate) if f * 2 * math.pi > 1e-9 * rate]
     if not swings:
         return f"{lasts}; no oscillation"
-    shown = [f if hertz.text == "Hz" else 2 * math.pi * f for f in swings]
-    name = ("" if hertz.text == "Hz" else "angular ") + ("frequency" if len(shown) == 1 else "frequencies")
-    listed = " and ".join(f"{f:.4g}" for f in dict.fromkeys(shown))
+    turn, angular = (1.0, "") if hertz.text == "Hz" else (2 * math.pi, "angular ")
+    name = angular + ("frequency" if len(swings) == 1 else "frequencies")
+    listed = " and ".join(f"{turn * f:.4g}" for f in dict.fromkeys(swings))
     ratio, least = solution.quantities["damping_ratio"], describe_speed(solution, solution.least_damped)
     at = f" at {least}" if least and least != describe_speed(solution, solution.worst) else ""
     damping = f"damping ratio {ratio if abs(ratio) > NOTHING else 0:.4g}{at}"
@@ -142,16 +150,16 @@ def describe_loads(solution: Solution) -> str:
     return ", ".join(parts)
 
 
-def describe_pitching(solution: Solution, si: Mapping[str, float]) -> str:
+def describe_pitching(solution: Solution) -> str:
     """Whether the bicycle pitches over, in any of its cases, and the ballast that prevents it."""
-    problem, parameters = solution.problem.posed, solution.parameters
-    listed = [case for case in problem.cases if not case.direction]
-    listed += [case for case in (solution.worst, solution.least_damped) if case]
-    each: list[Mapping[str, Any]] = [problem.values(case.applied(parameters)) for case in listed]
+    listed = list_cases(solution)
+    each: list[Mapping[str, Any]] = [
+        solution.problem.posed.values(case.applied(solution.parameters)) for case in listed
+    ]
     each = each or [solution.quantities]
     in_case = " in the worst case" if listed else ""
     for lifted, over in (("rear", "front"), ("front", "rear")):
-        load = min(float(values[f"load_{lifted}"]) for values in each)
+        load = min(float(case[f"load_{lifted}"]) for case in each)
         if abs(load) <= FEASIBLE:  # a limit chi_T <= 1 that is active is met within this
             return f"on the verge of pitching over the {over} wheel{in_case}; the {lifted} wheel carries no load"
         if load < 0:
@@ -162,14 +170,12 @@ def describe_pitching(solution: Solution, si: Mapping[str, float]) -> str:
 def _describe_ballast(solution: Solution, each: Sequence[Mapping[str, Any]], lifted: str) -> str:
     """The ballast at a wheel's contact that has no part in the lateral motion: with trail, at the rear one alone."""
     problem = solution.problem.posed
-    if f"m_ballast_{lifted}" in problem.vocabulary:
-        mass = max(float(values[f"m_ballast_{lifted}"]) for values in each)
-        needed = unit_of(problem, "m_B").show(mass, 4)
-    elif f"ballast_{lifted}" in problem.vocabulary:
-        needed = f"{max(float(values[f'ballast_{lifted}']) for values in each):.4g} m_B"
-    else:
-        return ""
-    return f"; ballast of {needed} at the {lifted} contact prevents this and does not change lean and steer"
+    units = {f"m_ballast_{lifted}": unit_of(problem, "m_B"), f"ballast_{lifted}": Unit("m_B")}
+    for name, unit in units.items():
+        if name in problem.vocabulary:
+            needed = unit.show(max(float(values[name]) for values in each), 4)
+            return f"; ballast of {needed} at the {lifted} contact prevents this and does not change lean and steer"
+    return ""
 
 
 def describe_inertia(solution: Solution) -> str:
@@ -189,34 +195,42 @@ def describe_roots(solution: Solution, digits: int) -> tuple[str, str]:
         named = f"  in {unit.text}" if unit.text else ""
         named += f"; √(g/w) = {1 / unit.one:.{digits}g} {unit.text}" if unit != own else ""
         return "roots", (", ".join(format_roots(solution.roots, digits, 1 / unit.one)) or "none") + named
-    each, size = solution.eigenfrequencies, abs(solution.problem.model.carrier)
+    each, least = solution.eigenfrequencies, NOTHING * abs(solution.problem.model.carrier)
     middle = sum(z.re for z in each) / len(each) if each else 0.0
     spread = max((math.hypot(z.re - middle, z.im) for z in each), default=0.0) or 1.0
     digits = min(digits + max(0, math.ceil(math.log10(max(abs(middle), spread) / spread))), ALL)
-    return "eigenfrequencies", ", ".join(format_frequency(z.re, z.im, digits, z.multiplicity, size) for z in each)
+    return "eigenfrequencies", ", ".join(format_frequency(z.re, z.im, digits, z.multiplicity, least) for z in each)
 
 
-def format_frequency(re: float, im: float, digits: int, multiplicity: int = 1, size: float = 0.0) -> str:
-    """An eigenfrequency as text; a part that is only rounding, compared with a size, is 0."""
-    size = max(size, math.hypot(re, im))
-    re, im = (x if abs(x) > NOTHING * size else 0.0 for x in (re, im))
-    parts = ([f"{re:.{digits}g}"] if re or not im else []) + ([f"{abs(im):.{digits}g}i"] if im else [])
-    sign = "-" if im < 0 else "+"
-    value = f" {sign} ".join(parts) if len(parts) > 1 else f"{'-' if im < 0 else ''}{parts[0]}"
+def format_root(root: Any, digits: int, multiplicity: int = 1, least: float = 0.0) -> str:
+    """The eigenfrequency of a record that has one, else its root or pair of roots."""
+    if (omega := root.eigenfrequency) is not None:
+        return format_frequency(omega.real, omega.imag, digits, multiplicity, least)
+    return format_pair(root.re, root.im, digits, multiplicity, least)
+
+
+def format_frequency(re: float, im: float, digits: int, multiplicity: int = 1, least: float = 0.0) -> str:
+    """An eigenfrequency as text; a part that is only rounding, or at most the least, is 0."""
+    re, im = _drop_noise(re, im, least)
+    value = f"{im:.{digits}g}i" if im and not re else f"{re:.{digits}g}"
+    value += f" {'-' if im < 0 else '+'} {abs(im):.{digits}g}i" if re and im else ""
     return value + format_multiplicity(multiplicity)
+
+
+def format_pair(re: float, im: float, digits: int, multiplicity: int = 1, least: float = 0.0) -> str:
+    """A root, or a pair of roots, as text; a part that is only rounding, or at most the least, is 0."""
+    re, im = _drop_noise(re, im, least)
+    return f"{re:.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "") + format_multiplicity(multiplicity)
+
+
+def _drop_noise(re: float, im: float, least: float) -> tuple[float, float]:
+    least = max(least, NOTHING * math.hypot(re, im))
+    return re if abs(re) > least else 0.0, im if abs(im) > least else 0.0
 
 
 def format_roots(roots: Sequence[Root], digits: int = 8, rate: float = 1.0) -> list[str]:
     """Roots as text, times a rate, a conjugate pair as one entry."""
-    entries = []
-    for root in roots:
-        if root.im < 0:
-            continue
-        re, im = (x * rate if abs(x) > NOTHING * root.size else 0.0 for x in (root.re, root.im))
-        entries.append(
-            f"{re:.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "") + format_multiplicity(root.multiplicity)
-        )
-    return entries
+    return [format_pair(r.re * rate, r.im * rate, digits, r.multiplicity) for r in roots if r.im >= 0]
 
 
 def format_multiplicity(multiplicity: int) -> str:
@@ -248,20 +262,8 @@ def _name_real(solution: Solution) -> str:
     """Which eigenfrequencies of a complex system are real."""
     model = solution.problem.model
     met = eigenfrequencies(model, roots_on_axis(model, solution.roots))
-    real = [format_frequency(z.re, 0.0, 5, z.multiplicity, abs(model.carrier or 0.0)) for z in met]
+    real = [format_frequency(z.re, 0.0, 5, z.multiplicity, NOTHING * abs(model.carrier or 0.0)) for z in met]
     return f"; {' and '.join(real)} {'is' if len(real) == 1 else 'are'} real" if real else ""
-
-
-def _other_set(model: Model, of: ParameterSet) -> ParameterSet | None:
-    """The other set of a model that is dimensionless and in SI."""
-    return next((s for s in model.sets if s is not of), None)
-
-
-def _find_counterpart(p: Parameter, other: ParameterSet) -> Parameter | None:
-    """The parameter of the other set that says the same."""
-    if p.name in other.names:
-        return None
-    return next((q for q in other.parameters if p.counterpart == q.name or q.counterpart == p.name), None)
 
 
 def _describe_twin(twin: Parameter | Quantity, x: float, digits: int = ALL) -> str:

@@ -1,7 +1,6 @@
 """What an optimum means, what rounding does to it, and how its multiple roots split."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
 from itertools import takewhile
 
 from tmsopt.analysis import NOT_COVERED, NOT_MINIMAL, STRICT, Response
@@ -10,9 +9,19 @@ from tmsopt.analysis.explain import Explanation
 from tmsopt.analysis.optimality import Optimality, RightmostRoot
 from tmsopt.analysis.rounding import ALONE, RoundedDesign
 from tmsopt.analysis.splitting import DEVIATION, Law
-from tmsopt.documents.blocks import Badge, Block, Cell, Chapter, Level, Sentence, TableBlock, count_things
-from tmsopt.documents.design_rows import format_frequency, format_multiplicity
-from tmsopt.documents.maker import Maker
+from tmsopt.documents.blocks import (
+    Badge,
+    Cell,
+    Chapter,
+    Level,
+    Parts,
+    Row,
+    Sentence,
+    TableBlock,
+    Tone,
+    count_things,
+)
+from tmsopt.documents.design_rows import format_pair, format_root
 
 _SHARE, _NIL = 0.05, 1e-9
 """Of decay and objective: what rounding may cost; what is nothing."""
@@ -22,35 +31,24 @@ _UNRESOLVED = (
     "solve with another value to see"
 )
 
-Blocks = Iterator[Block]
 
-
-def summarise_explanation(found: Explanation) -> Iterator[Badge]:
-    """Structure, verdict, and how many limits and warnings there are."""
-    yield Badge(found.structure)
-    yield from summarise_optimality(found.optimality)
-    yield Badge(count_things(len(found.levers), "limit"))
-    if found.warnings:
-        yield Badge(count_things(len(found.warnings), "warning"))
-
-
-def write_explanation(found: Explanation, _level: Level) -> Iterator[Chapter]:
+def write_explanation(found: Explanation, _level: Level) -> Parts:
     """The meaning, local optimality, warnings, what limits are worth, what rounding costs."""
-    warnings = (Sentence(text, "warning", "doubt") for text in found.warnings)
-    yield Chapter(
-        "meaning", (Sentence(found.summary, "meaning", "answer"), *explain_optimality(found.optimality), *warnings)
-    )
+    warnings = count_things(found.warnings, "warning") if found.warnings else ""
+    yield found.structure, *_judge_optimality(found.optimality), count_things(found.levers, "limit"), warnings
+    yield Chapter("meaning")
+    yield Sentence(found.summary, "meaning", "answer")
+    yield from write_optimality(found.optimality)
+    yield from (Sentence(text, "warning", "doubt") for text in found.warnings)
     if found.levers:
-        head = Sentence("improvement if a limit is relaxed, from a new solution near the optimum:")
-        yield Chapter("limits", (head, *(Sentence(lever.sentence) for lever in found.levers)))
-    yield Chapter("rounding", tuple(_write_rounding(found)))
-
-
-def _write_rounding(found: Explanation) -> Blocks:
+        yield Chapter("limits")
+        yield "improvement if a limit is relaxed, from a new solution near the optimum:"
+        yield from (lever.sentence for lever in found.levers)
+    yield Chapter("rounding")
     if found.precision:
         yield tabulate_rounding(found)
     if found.worst:
-        yield Sentence(f"rounding {found.worst} alone to {ALONE} digits has the largest effect")
+        yield f"rounding {found.worst} alone to {ALONE} digits has the largest effect"
 
 
 def describe_rounding(found: Explanation) -> str:
@@ -62,8 +60,8 @@ def describe_rounding(found: Explanation) -> str:
     if not rows or not math.isfinite(found.abscissa):
         return ""
     stable = found.abscissa < -_NIL
-    held = list(takewhile(lambda row: _is_kept(row, found), reversed(rows)))  # few digits may do no harm by chance
-    enough = held[-1] if held else None
+    held = takewhile(lambda row: _is_near(row, found) and not row.violations, reversed(rows))
+    enough = [None, *held][-1]  # not just the fewest digits: these may do no harm by chance
     three = next((row for row in rows if row.digits == ALONE), None)
     parts, unstable = [], False
     if stable and three and three.realised < 0 and (enough is None or enough.digits > ALONE):
@@ -76,10 +74,6 @@ def describe_rounding(found: Explanation) -> str:
     parts.append(f"to {last.digits} digits the design {(_describe_benefit if enough else _describe_cost)(last, found)}")
     needs = f"; {found.worst} needs the most digits" if found.worst and not unstable else ""
     return f"{'; '.join(parts)}{needs}"
-
-
-def _is_kept(row: RoundedDesign, found: Explanation) -> bool:
-    return _is_near(row, found) and not row.violations
 
 
 def _is_near(row: RoundedDesign, found: Explanation) -> bool:
@@ -109,36 +103,26 @@ def _describe_cost(row: RoundedDesign, found: Explanation) -> str:
 
 def tabulate_rounding(found: Explanation) -> TableBlock:
     """The design rounded, one parameter alone and then all together."""
-    rows: list[Sequence[str]] = [
-        ("parameter", "rounded to", "abscissa", "abscissa rises by", "damping_ratio", "violated limits")
-    ]
-    rows += [_list_rounded(f"{name} alone", row.written[name], row) for name, row in found.rounding.items()]
-    rows += [_list_rounded("all", f"{row.digits} digits", row) for row in found.precision]
-    known = any(math.isfinite(row.damping_ratio) for row in (*found.rounding.values(), *found.precision))
-    return TableBlock(rows if known else [(*row[:4], *row[5:]) for row in rows], "What rounding does")
+    named = [(f"{name} alone", row.written[name], row) for name, row in found.rounding.items()]
+    named += [("all", f"{row.digits} digits", row) for row in found.precision]
+    known = any(math.isfinite(row.damping_ratio) for *_, row in named)
+    heads = ("damping_ratio",) if known else ()
+    rows: list[Row] = [("parameter", "rounded to", "abscissa", "abscissa rises by", *heads, "violated limits")]
+    for which, to, row in named:
+        ratio = (f"{_drop_noise(row.damping_ratio):.4g}",) if known else ()
+        abscissa, loss = Cell(row.realised, error=_ROUNDED), f"{_drop_noise(row.loss):.2g}"
+        rows.append((which, to, abscissa, loss, *ratio, ", ".join(row.violations)))
+    return TableBlock(rows, "What rounding does")
 
 
-def _list_rounded(which: str, to: str, row: RoundedDesign) -> tuple[str, ...]:
-    ratio, loss = _drop_noise(row.damping_ratio), _drop_noise(row.loss)
-    abscissa = str(Cell(row.realised, error=_ROUNDED))
-    return which, to, abscissa, f"{loss:.2g}", f"{ratio:.4g}", ", ".join(row.violations)
+def _judge_optimality(found: Optimality) -> tuple[Badge, str]:
+    tones: dict[str, Tone] = {STRICT: "good", NOT_MINIMAL: "bad"}
+    return Badge(found.verdict, tones.get(found.verdict, "doubt")), f"by order {found.order}" if found.order else ""
 
 
-def summarise_optimality(found: Optimality) -> Iterator[Badge]:
-    """The verdict."""
-    tones = {STRICT: Badge(found.verdict, "good"), NOT_MINIMAL: Badge(found.verdict, "bad")}
-    yield tones.get(found.verdict, Badge(found.verdict, "doubt"))
-    if found.order:
-        yield Badge(f"by order {found.order}")
-
-
-def write_optimality(found: Optimality, _level: Level) -> Iterator[Chapter]:
-    """The verdict and its multipliers."""
-    yield Chapter("answer", tuple(explain_optimality(found)))
-
-
-def explain_optimality(found: Optimality) -> Blocks:
+def write_optimality(found: Optimality, _level: Level = "full") -> Parts:
     """The verdict, then the multipliers of each root on the rightmost line."""
+    yield _judge_optimality(found)
     if found.verdict == NOT_COVERED:
         yield Sentence(f"not judged, for {found.reason}", "local optimality")
         return
@@ -147,7 +131,7 @@ def explain_optimality(found: Optimality) -> Blocks:
         of_H = found.roots[0].eigenfrequency is not None
         root = "an eigenfrequency of the largest Im ω" if of_H else "a root on the rightmost line"
         balance = f"the optimality conditions hold within {found.residual:.1g}"
-        yield Sentence(f"cost in the objective per unit of each change of {root}; {balance}:")
+        yield f"cost in the objective per unit of each change of {root}; {balance}:"
         head = ("root", f"shift {'down' if of_H else 'to the left'}", "share of all shifts", "split of a multiple root")
         rows = [head, *map(_list_root, found.roots)]
         is_multiple = any(root.multiplicity > 1 for root in found.roots)
@@ -155,17 +139,9 @@ def explain_optimality(found: Optimality) -> Blocks:
 
 
 def _list_root(root: RightmostRoot) -> tuple[str, ...]:
-    place = _format_place(root.re, root.im, 5)
-    if (omega := root.eigenfrequency) is not None:
-        place = format_frequency(omega.real, omega.imag, 5)
     share = f"{100 * root.share:.3g} %" if root.share < 1 - 1e-9 else ""
     kappa = f"{_drop_noise(root.kappa, root.beta):.4g}" if root.multiplicity > 1 else ""
-    return place + format_multiplicity(root.multiplicity), f"{root.beta:.4g}", share, kappa
-
-
-def _format_place(re: float, im: float, digits: int) -> str:
-    """A root or a pair; a real part that is only rounding is 0."""
-    return f"{_drop_noise(re, math.hypot(re, im)):.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "")
+    return format_root(root, 5, root.multiplicity), f"{root.beta:.4g}", share, kappa
 
 
 def _drop_noise(x: float, size: float = 1.0) -> float:
@@ -173,28 +149,18 @@ def _drop_noise(x: float, size: float = 1.0) -> float:
     return 0.0 if abs(x) <= _ROUNDED * size else x
 
 
-def summarise_diagnosis(found: Diagnosis) -> Iterator[Badge]:
-    """The root and its chains."""
-    yield Badge(f"{found.algebraic}-fold {'pair' if found.im else 'root'}")
-    yield Badge(f"{found.re:.5g}" + (f" ± {found.im:.5g}i" if found.im else ""))
-    yield Badge(found.kind)
-
-
-def write_diagnosis(found: Diagnosis, level: Level) -> Iterator[Chapter]:
-    """The kind of the root, and how it splits."""
-    yield Chapter("answer", tuple(explain_diagnosis(found, level != "brief")))
-
-
-def explain_diagnosis(found: Diagnosis, full: bool = False) -> Blocks:
+def write_diagnosis(found: Diagnosis, level: Level = "full") -> Parts:
     """Two sentences: the kind of the root, and how it splits; the laws of every parameter where all is wanted."""
+    what = "pair" if found.im else "root"
+    yield f"{found.algebraic}-fold {what}", format_pair(found.re, found.im, 5), found.kind
+    full = level != "brief"
     yield Sentence(_describe_root(found), tone="answer")
-    yield Sentence(_describe_splitting(found, full))
+    yield _describe_splitting(found, full)
     if full:
         yield TableBlock(_list_laws(found), "How the root splits")
 
 
 def _describe_root(found: Diagnosis) -> str:
-    place = _format_place(found.re, found.im, 8)
     vectors = count_things(found.geometric, "independent eigenvector")
     if found.jordan is None:
         why = "there are no matrices to judge by, so one chain of eigenvectors, as for a companion matrix"
@@ -207,9 +173,8 @@ def _describe_root(found: Diagnosis) -> str:
     many = "s" if len(found.partial) > 1 else ""
     chains = f"Jordan chain{many} of length {lengths}" if found.partial else "chains not decided"
     what = "pair" if found.im else "root"
-    if (omega := found.eigenfrequency) is not None:
-        what, place = "eigenfrequency", format_frequency(omega.real, omega.imag, 8)
-    return f"{found.algebraic}-fold {what} {place}: {found.kind}, {chains} ({why})"
+    what = what if found.eigenfrequency is None else "eigenfrequency"
+    return f"{found.algebraic}-fold {what} {format_root(found, 8)}: {found.kind}, {chains} ({why})"
 
 
 def _describe_splitting(found: Diagnosis, full: bool) -> str:
@@ -254,21 +219,14 @@ def _describe_range(law: Law) -> str:
     return f"while {least}|ε| <= {min(law.below, law.above):.2g}"
 
 
-def _list_laws(found: Diagnosis) -> list[Sequence[str]]:
-    rows: list[Sequence[str]] = [("parameter", "change", "roots", "shift", "holds for ε < 0", "holds for ε > 0")]
+def _list_laws(found: Diagnosis) -> list[Row]:
+    rows: list[Row] = [("parameter", "change", "roots", "shift", "holds for ε < 0", "holds for ε > 0")]
     for response in found.responses:
         change = "relative" if response.relative else "absolute"
         for law in response.laws:
             least = f"{law.least:.2g} <= " if law.least else ""
             ends = (f"{least}|ε| <= {x:.2g}" for x in (law.below, law.above))
             rows.append((response.parameter, change, str(law.branches.roots), _format_law(law), *ends))
-        for count, word in ((response.unmoved, "none"), (response.unresolved, "not resolved")):
+        for count, word in ((response.unmoved, "no shift"), (response.unresolved, "not resolved")):
             rows += [(response.parameter, change, str(count), word, "", "")] if count else []
     return rows
-
-
-MAKERS: Mapping[str, Maker] = {
-    "Explanation": Maker(summarise_explanation, write_explanation, "draw_rounding"),
-    "Optimality": Maker(summarise_optimality, write_optimality, "draw_roots"),
-    "Diagnosis": Maker(summarise_diagnosis, write_diagnosis, "draw_splitting"),
-}

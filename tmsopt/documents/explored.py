@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from tmsopt.models import in_words_of
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from tmsopt.fronts import Front
     from tmsopt.proofs import Proof
     from tmsopt.search import Every
-    from tmsopt.studies import Results
+    from tmsopt.studies import Results, Row
     from tmsopt.tracing import Trace
 
 Named = tuple[str, Mapping[str, float]]
@@ -56,10 +57,8 @@ def _number_designs(designs: Iterable[Named]) -> list[Named]:
     found: dict[tuple[float, ...], Named] = {}
     for name, values in designs:
         found.setdefault(tuple(values.values()), (name, values))
-    kept, met = [*found.values()][:_MOST], Counter[str]()
-    met.update(name for name, _ in kept)
-    seen = Counter[str]()
-    listed = []
+    kept = [*found.values()][:_MOST]
+    met, seen, listed = Counter(name for name, _ in kept), Counter[str](), []
     for name, values in kept:
         seen[name] += 1
         listed.append((f"{name}, {seen[name]} of {met[name]}" if met[name] > 1 else name, values))
@@ -69,27 +68,27 @@ def _number_designs(designs: Iterable[Named]) -> list[Named]:
 def _list_front(front: "Front") -> Iterator[Named]:
     """The fastest decay, then both ends and what changes between them."""
     if front.points:
-        best = min(front.points, key=lambda p: _replace_nan(_decay_rate(p.solution)))
+        best = min(front.points, key=lambda p: _replace_nan(_decay_rate(front.problem.posed, p.solution)))
         yield best.label or "least abscissa", best.solution.parameters
     yield from ((point.label, point.solution.parameters) for point in front.points if point.label)
 
 
-def _decay_rate(solution: "Solution") -> float:
+def _decay_rate(problem: Posed, design: "Solution | Row") -> float:
     """Abscissa by the clock, where there is one."""
-    return solution.abscissa / unit_at(solution.problem.posed, "abscissa", solution.parameters).one
+    return design.abscissa / unit_at(problem, "abscissa", design.parameters).one
 
 
 def _list_trace(trace: "Trace") -> Iterator[Named]:
     """Events at which more roots meet, then the fastest decay, then what else happens; not where a limit ends it."""
-    events = [(e, float(b.abscissa[e.index])) for b in trace.branches for e in b.events if e.name not in _ENDS]
-    events.sort(key=lambda found: ("EP" not in found[0].name, _replace_nan(found[1])))
-    met = [(in_words_of(trace.problem.model, e.name), e.parameters, "EP" in e.name) for e, _ in events]
-    yield from ((name, values) for name, values, meet in met if meet)
-    points = [(float(x), branch, k) for branch in trace.branches for k, x in enumerate(branch.abscissa)]
+    events = [(e, branch) for branch in trace.branches for e in branch.events if e.name not in _ENDS]
+    events.sort(key=lambda at: _replace_nan(at[1].abscissa[at[0].index]))
+    named = [("EP" in e.name, in_words_of(trace.problem.model, e.name), e.parameters) for e, _ in events]
+    yield from ((name, values) for meets, name, values in named if meets)
+    points = [(branch, k) for branch in trace.branches for k in range(len(branch))]
     if points:
-        _, branch, k = min(points, key=lambda point: _replace_nan(point[0]))
+        branch, k = min(points, key=lambda at: _replace_nan(at[0].abscissa[at[1]]))
         yield "least abscissa", {n: float(column[k]) for n, column in branch.parameters.items()}
-    yield from ((name, values) for name, values, meet in met if not meet)
+    yield from ((name, values) for meets, name, values in named if not meets)
 
 
 def _list_chart(chart: "Chart") -> Iterator[Named]:
@@ -100,12 +99,11 @@ def _list_chart(chart: "Chart") -> Iterator[Named]:
 
 def _list_results(results: "Results") -> Iterator[Named]:
     """The best row, and the one that decays least."""
+    problem = results.study.problem.posed
     known = [row for row in results.rows if math.isfinite(row.abscissa)]
+    rate = partial(_decay_rate, problem)
     if known:
-        problem = results.study.problem
-        decays = {row.number: row.abscissa / unit_at(problem.posed, "abscissa", row.parameters).one for row in known}
-        best = results.summary.best or min(known, key=lambda row: decays[row.number])
-        last = max(known, key=lambda row: decays[row.number])
+        best, last = results.summary.best or min(known, key=rate), max(known, key=rate)
         yield f"best, row {best.number}", best.parameters
         yield f"greatest abscissa, row {last.number}", last.parameters
 

@@ -8,6 +8,7 @@ import io
 import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import fields, is_dataclass, replace
 from html import escape
 from importlib.resources import files as resources
 from itertools import groupby
@@ -23,6 +24,7 @@ _UNSHOWN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\
 _LONG = 24  # characters of a cell in a column that stays wide
 _FILTERED = 12  # rows from which a table has a field that filters them
 _ON_PAPER = 100  # rows of a table at most, in document.css too
+_HOLDERS = ("problem", "asked", "study", "design")  # attributes of a result that may have a title
 _LARGEST = 500_000  # bytes of a drawing; one with more, such as of thousands of marks, is an image of dots
 _DOTS = 160  # an inch
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
@@ -126,18 +128,16 @@ def _mark_up_runs(blocks: Sequence[Block], plain: bool) -> Iterator[str]:
     """Facts that follow each other are one list; pictures that do stand beside each other where there is room."""
     for (kind, labelled), run in groupby(blocks, key=lambda b: (type(b), isinstance(b, Sentence) and bool(b.label))):
         some: list[Any] = list(run)
-        if kind is Sentence and labelled:
+        if labelled:
             yield mark_list((one.label, one.text) for one in some)
-        elif kind is Figure:
-            drawn = [draw_figure(one) for one in some]
-            together = "\n".join(drawn)
-            yield f'<div class="beside">\n{together}\n</div>' if len(drawn) > 1 else together
+        elif kind is Figure and len(some) > 1:
+            drawn = "\n".join(map(draw_figure, some))
+            yield f'<div class="beside">\n{drawn}\n</div>'
         else:
-            for one in some:
-                yield _mark_up_block(one, plain)
+            yield from (_mark_up_block(one, plain) for one in some)
 
 
-def _mark_up_block(block: Any, plain: bool) -> str:
+def _mark_up_block(block: Block, plain: bool) -> str:
     match block:
         case Sentence(text, _, tone):
             lead = ' class="lead"' if tone in ("answer", "good", "doubt", "bad") else ""
@@ -146,33 +146,31 @@ def _mark_up_block(block: Any, plain: bool) -> str:
             return (f"<p><strong>{escape_text(title)}</strong></p>\n" if title else "") + mark_list(items)
         case Verbatim(text, label):
             return mark_verbatim(text.strip("\n"), label)
-    return _mark_table(block, plain)
+        case Figure():
+            return draw_figure(block)
+        case TableBlock():
+            return _mark_table(block, plain)
 
 
 def _mark_table(grid: TableBlock, plain: bool) -> str:
     """A table that can be sorted, a long one filtered too, without columns in which nothing stands."""
-    rows = grid.texts
-    rows = (
-        rows if not plain or grid.most is None or len(rows) <= grid.most else [*rows[: grid.most], ["…"] * len(rows[0])]
-    )
+    rows, most = grid.texts, grid.most
+    if plain and most is not None and len(rows) > most:
+        rows = [*rows[:most], ["…"] * len(rows[0])]
     columns = [column for column in zip(*rows, strict=True) if any(column[1:])]
     if not columns:
         return ""
     kinds = [_classify_column(column[1:]) for column in columns]
-    headed = any(column[0] for column in columns)
-    heads = "".join(
-        f'<th scope="col"{k}>{escape_text(c[0] or "remark")}</th>' for c, k in zip(columns, kinds, strict=True)
-    )
-    body = [*zip(*(column[1:] for column in columns), strict=True)]
+    heads, *body = zip(*columns, strict=True)
+    cells = "".join(f'<th scope="col"{k}>{escape_text(c or "remark")}</th>' for c, k in zip(heads, kinds, strict=True))
+    head = f"<thead><tr>{cells}</tr></thead>" if any(heads) else ""
     lines = "\n".join(f"<tr>{_mark_cells(row, kinds)}</tr>" for row in body)
-    head = f"<thead><tr>{heads}</tr></thead>" if headed else ""
     if plain:
         return f"<table>{head}<tbody>{lines}</tbody></table>"
-    kind = "sortable filterable" if len(body) >= _FILTERED else "sortable"
     said = f"On paper are the first {_ON_PAPER} of the rows that are shown."
     paper = f'\n<p class="print">{said}</p>' if len(body) > _ON_PAPER else ""
     caption = escape_text(grid.caption)
-    kind = f' class="{kind}"' if headed else ""
+    kind = f' class="sortable{" filterable" if len(body) >= _FILTERED else ""}"' if head else ""
     return (
         f'<div class="rows" role="group" tabindex="0" aria-label="{caption}"><table{kind}>\n'
         f"<caption>{caption}</caption>\n{head}\n<tbody>\n{lines}\n</tbody>\n</table></div>{paper}"
@@ -197,34 +195,38 @@ def draw_figure(figure: Figure) -> str:
     Letters are outlines, and a drawing is an image apart from the page: nothing in it is markup of the page.
     """
     try:
-        drawn = figure.draw()
-        whole = drawn.figure.figure if isinstance(drawn, Axes) else drawn
-        data, kind = _save_image(whole, "svg"), "svg+xml"
+        drawn = figure.draw(_remove_titles(figure.result))
+        data, kind = _save_image(drawn, "svg"), "svg+xml"
         if len(data) > _LARGEST:
-            data, kind = _save_image(whole, "png"), "png"
+            data, kind = _save_image(drawn, "png"), "png"
     except Exception:  # of a design without roots, of a chart over three parameters, …
         return ""
-    said, coded = escape_text(figure.caption), base64.b64encode(data).decode()
-    return f'<figure><img alt="{said}" src="data:image/{kind};base64,{coded}"><figcaption>{said}</figcaption></figure>'
+    said = escape_text(figure.caption)
+    source = f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
+    return f'<figure><img alt="{said}" src="{source}"><figcaption>{said}</figcaption></figure>'
+
+
+def _remove_titles(result: Any) -> Any:
+    names = {f.name for f in fields(result) if f.init}
+    held = {n: _remove_titles(v) for n in _HOLDERS if n in names and is_dataclass(v := getattr(result, n))}
+    return replace(result, **held, **({"title": ""} if "title" in names else {}))
 
 
 def _draw_thumbnail(draw: Callable[[], Axes], name: str) -> str:
     """The picture for a notebook; none where it cannot be drawn: a display must not break over it."""
     try:
-        image = io.BytesIO()
-        figure: Any = draw().get_figure()
-        figure.savefig(image, format="png", dpi=100, bbox_inches="tight")
+        coded = base64.b64encode(_save_image(draw(), "png", 100)).decode()
     except Exception:  # whatever it was, the rest says what the result is
         return ""
-    coded = base64.b64encode(image.getvalue()).decode()
     return f'<img alt="{escape_text(name)}" style="max-width:100%" src="data:image/png;base64,{coded}">'
 
 
-def _save_image(figure: Any, kind: str) -> bytes:
+def _save_image(drawn: Any, kind: str, dots: int = _DOTS) -> bytes:
     """The same bytes for the same figure, whenever it is drawn."""
     image = io.BytesIO()
+    figure = drawn.figure.figure if isinstance(drawn, Axes) else drawn
     about = {"Date": None} if kind == "svg" else {}
     with rc_context({"svg.hashsalt": "tmsopt", "svg.fonttype": "path"}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph", UserWarning)  # of letters that no font here has: boxes show that
-        figure.savefig(image, format=kind, dpi=_DOTS, bbox_inches="tight", metadata=about)
+        figure.savefig(image, format=kind, dpi=dots, bbox_inches="tight", metadata=about)
     return image.getvalue()

@@ -1,22 +1,22 @@
 """A design compared with the laws of the paper, and the paper recomputed."""
 
+import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 
 from tmsopt.documents.blocks import (
     Badge,
-    Block,
     Cell,
     Chapter,
     Level,
     Listing,
+    Parts,
+    Row,
     Sentence,
     TableBlock,
     Tone,
     count_things,
 )
-from tmsopt.documents.maker import Maker
 from tmsopt.documents.solution import list_branches, write_headline
 from tmsopt.models import tms
 from tmsopt.paper.compare import Comparison
@@ -31,39 +31,37 @@ _ABOUT = (
 )
 
 
-def summarise_comparison(comparison: Comparison) -> Iterator[Badge]:
-    """How many laws apply and agree."""
+def write_comparison(comparison: Comparison, _level: Level) -> Parts:
+    """Laws and numbers side by side where laws are known, then the two formulations."""
     applying = [row for row in comparison.laws if row.applies]
     agree = sum(row.agrees is True for row in applying)
     tone: Tone = "doubt" if not applying else "good" if agree == len(applying) else "bad"
-    yield Badge(f"{agree} of {len(applying)} laws agree", tone)
-    yield Badge(f"solved as {comparison.other.formulation} too" if comparison.other else "no other formulation")
-
-
-def write_comparison(comparison: Comparison, _level: Level) -> Iterator[Chapter]:
-    """Laws and numbers side by side where laws are known, then the two formulations."""
+    also = f"solved as {comparison.other.formulation} too" if comparison.other else "no other formulation"
+    yield Badge(f"{agree} of {len(applying)} laws agree", tone), also
     design = comparison.design
     model = design.problem.model
-    answer: list[Block] = list(write_headline(design))
-    answer += [Sentence(model.omits, "model")] if model.omits else []
-    yield Chapter("answer", tuple(answer))
+    yield from write_headline(design)
+    yield Sentence(model.omits, "model")
     if model is tms:
-        yield Chapter("laws", tuple(_write_laws(comparison)), "", "wide")
+        yield Chapter("laws", width="wide")
+        yield from _write_laws(comparison)
     else:
+        yield Chapter("laws")
         named = f"the {model.title}" if model.statement is None else f"'{model.title}'"
         of_skates = "" if model.carrier is not None else ", only of skates (tms)"
-        yield Chapter("laws", (Sentence(f"no laws are known of {named}{of_skates}"),))
+        yield f"no laws are known of {named}{of_skates}"
+    yield Chapter("formulations")
     if comparison.other is None:
-        other: list[Block] = [Sentence(f"none, {comparison.reason}", "other formulation")]
+        yield Sentence(f"none, {comparison.reason}", "other formulation")
     else:
         names = f"{comparison.other.formulation} minus {design.formulation}"
         differences = ((n, f"{d:.1e}") for n, d in comparison.differences.items())
-        other = [TableBlock((("formulations", names), *differences), "Differences of the formulations")]
-    yield Chapter("formulations", (*other, *map(Sentence, list_branches(design))))
+        yield TableBlock((("formulations", names), *differences), "Differences of the formulations")
+    yield from list_branches(design)
 
 
-def _write_laws(comparison: Comparison) -> Iterator[Block]:
-    rows: list[Sequence[Cell | str]] = [("law", "of", "numeric", "law says", "relative", "verdict")]
+def _write_laws(comparison: Comparison) -> Parts:
+    rows: list[Row] = [("law", "of", "numeric", "law says", "relative", "verdict")]
     silent: dict[str, list[str]] = {}
     for row in comparison.laws:
         if row.applies:
@@ -76,29 +74,22 @@ def _write_laws(comparison: Comparison) -> Iterator[Block]:
         yield Sentence(f"{', '.join(named)}; {reason}", "not applicable to this design")
 
 
-def summarise_ledger(ledger: Ledger) -> Iterator[Badge]:
-    """Entries per verdict."""
-    yield Badge(count_things(len(ledger.entries), "entry", "entries"))
-    for verdict, count in ledger.counts.items():
-        if count:
-            yield Badge(f"{count} {verdict}")
-
-
-def write_ledger(ledger: Ledger, level: Level) -> Iterator[Chapter]:
+def write_ledger(ledger: Ledger, level: Level) -> Parts:
     """Every entry under its section, with the number of entries per verdict at the end."""
+    counted = (f"{count} {verdict}" for verdict, count in ledger.counts.items() if count)
+    yield count_things(ledger.entries, "entry", "entries"), *counted
     if level == "brief":
-        yield Chapter("source", (Sentence(ledger.source),))
+        yield ledger.source
     for number, (title, entries) in enumerate(groupby(ledger.entries, key=lambda entry: entry.section)):
-        heading = (Sentence(title, tone="answer"),) if level == "brief" else ()
-        yield Chapter(f"part-{number}", (*heading, *map(_write_entry, entries)), title, "wide")
+        yield Chapter(f"part-{number}", title, "wide")
+        if level == "brief":
+            yield Sentence(title, tone="answer")
+        for entry in entries:
+            verdict = ("verdict", entry.verdict.upper())
+            yield Listing((verdict, *_list_entry(entry)), f"{entry.key}: {entry.statement} ({entry.place})")
+    yield Chapter("verdicts")
     counts = [*ledger.counts.items(), ("entries", len(ledger.entries))]
-    grid = TableBlock((("", ""), *((str(count), verdict) for verdict, count in counts)), "Entries per verdict")
-    yield Chapter("verdicts", (grid,))
-
-
-def _write_entry(entry: Entry) -> Listing:
-    verdict = ("verdict", entry.verdict.upper())
-    return Listing((verdict, *_list_entry(entry)), f"{entry.key}: {entry.statement} ({entry.place})")
+    yield TableBlock((("", ""), *((str(count), verdict) for verdict, count in counts)), "Entries per verdict")
 
 
 def _list_entry(entry: Entry) -> list[tuple[str, str]]:
@@ -130,12 +121,4 @@ def write_ledger_page(ledger: Ledger) -> str:
 
 def _escape(text: str) -> str:
     """Text in which Markdown reads no markup."""
-    for sign in ("\\", "*", "_", "|", "<", "^"):
-        text = text.replace(sign, f"\\{sign}")
-    return text
-
-
-MAKERS: Mapping[str, Maker] = {
-    "Comparison": Maker(summarise_comparison, write_comparison, "draw_comparison"),
-    "Ledger": Maker(summarise_ledger, write_ledger, "draw_ledger"),
-}
+    return re.sub(r"([\\*_|<^])", r"\\\1", text)

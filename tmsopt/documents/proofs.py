@@ -1,7 +1,7 @@
 """Proofs, and all designs with a pattern: what is proved, and to how many digits."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -9,19 +9,20 @@ from tmsopt import plots
 from tmsopt.algebra.balls import Number, fraction
 from tmsopt.documents.blocks import (
     Badge,
-    Block,
     Cell,
     Chapter,
     Figure,
     Level,
+    Parts,
+    Row,
     Sentence,
     TableBlock,
     count_things,
+    judge,
     say_whether,
 )
-from tmsopt.documents.design_rows import convert_to_si, format_multiplicity
-from tmsopt.documents.maker import Maker, remove_titles
-from tmsopt.documents.solution import tabulate_parameters, write_bicycle, write_growth_picture
+from tmsopt.documents.design_rows import convert_to_si, format_multiplicity, tabulate_parameters
+from tmsopt.documents.solution import write_bicycle, write_growth_picture
 from tmsopt.documents.tables import write_question
 from tmsopt.global_search import Completeness
 from tmsopt.models.user_spectrum import pattern_of
@@ -39,78 +40,78 @@ if TYPE_CHECKING:
 _OF_OTHERS = re.compile(r"(.*\.)?[bcdW]\d+")  # of factors whose roots are listed
 
 
-def summarise_proof(proof: Proof) -> Iterator[Badge]:
-    """Whether it is proved, and what."""
-    yield Badge("proved", "good") if proof.proved else Badge("not proved", "bad")
-    yield Badge(proof.pattern or "nothing")
-    yield Badge(f"{proof.digits} digits")
-    if proof.stable.holds is not None:
-        yield Badge("stable", "good") if proof.stable.holds else Badge("not stable", "bad")
-
-
-def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None) -> Iterator[Chapter]:
+def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None) -> Parts:
     """The claim, the numbers with their radii, the facts that follow, and the numbers that were taken exactly.
 
     Args:
         design: what was proved: a page has its pictures and parameters too.
     """
-    claim = Sentence(proof.claim, *(("proved", "good") if proof.proved else ("not proved", "bad")))
-    answer: list[Block] = [claim]
-    answer += [Sentence(proof.reason, "why")] if proof.reason else []
+    verdict, stable = judge(proof.proved, "proved"), judge(proof.stable.holds, "stable")
+    yield verdict, proof.pattern or "nothing", f"{proof.digits} digits", stable
+    yield Sentence(proof.claim, verdict.text, verdict.tone)
+    yield Sentence(proof.reason, "why")
     if proof.problem is None:
-        yield Chapter("answer", tuple(answer))
         return
     problem = proof.problem.posed
     if problem.scenarios or problem.tolerances:
-        answer.append(Sentence("for the worst case that was found"))
-    yield Chapter("answer", tuple(answer))
+        yield "for the worst case that was found"
     if not proof.parameters:
         return
     if rows := list_numbers(problem, proof):
+        yield Chapter("digits", width="wide")
+        if proof.stored and proof.reason:
+            yield "the stored design:"
         head = ("number", "decimal", "radius", "unit")
-        stored = (Sentence("the design as stored:"),) if proof.stored and proof.reason else ()
-        digits = TableBlock((head, *rows), f"Numbers that were proved, to {proof.digits} digits", needs=(9, 8, 5, 6))
-        yield Chapter("digits", (*stored, digits), "", "wide")
+        yield TableBlock((head, *rows), f"Numbers that were proved, to {proof.digits} digits", needs=(9, 8, 5, 6))
     if level == "page":
-        yield Chapter("roots", (Figure(lambda: plots.draw_roots(remove_titles(proof)), "Roots in the complex plane"),))
-    yield Chapter("method", tuple(_describe_method(problem, proof)))
-    yield Chapter("facts", tuple(_write_facts(proof)))
-    yield Chapter("exact", tuple(_write_exact_numbers(problem, proof)), "Taken exactly")
+        yield Chapter("roots")
+        yield Figure(plots.draw_roots, proof, "Roots in the complex plane")
+    yield Chapter("method")
+    yield from _describe_method(problem, proof)
+    yield Chapter("facts")
+    yield from _write_facts(proof)
+    yield Chapter("exact", "Exact numbers")
+    yield from _write_exact_numbers(problem, proof)
     if level == "page" and design is not None:
         yield from write_bicycle(design)
-        yield Chapter("parameters", (tabulate_parameters(design, convert_to_si(design)),), "", "wide")
+        yield Chapter("parameters", width="wide")
+        yield tabulate_parameters(design, convert_to_si(design))
         yield from write_growth_picture(design)
     elif level == "page":
-        yield write_question(problem)
+        yield from write_question(problem)
 
 
 def list_numbers(problem: Posed, proof: Proof) -> list[tuple[str, str, str, str]]:
     """The numbers solved for, and the roots: name, decimal, radius, unit."""
-    rows = []
+    return [
+        (name, x.value if float(x.value) else "0", "exact" if x.radius == "0" else f"± {x.radius}", unit)
+        for name, x, unit in _find_numbers(problem, proof)
+    ]
+
+
+def _find_numbers(problem: Posed, proof: Proof) -> Iterator[tuple[str, Number, str]]:
     units = _find_units(problem, proof)
     per = units.get("abscissa", "")
     for name in proof.moved:
-        unit = problem.parameter_set[name].unit
-        rows.append((name, *_format_ball(proof.parameters[name]), "" if unit == "1" else unit))
+        yield name, proof.parameters[name], units.get(name, "")
         if name in proof.tangents:
-            rows.append((f"tan({name})", *_format_ball(proof.tangents[name]), ""))
-    own = ((name, x) for name, x in proof.unknowns.items() if not _OF_OTHERS.fullmatch(name))
-    rows += [(name, *_format_ball(x), units.get(name, "")) for name, x in own]
+            yield f"tan({name})", proof.tangents[name], ""
+    for name, x in proof.unknowns.items():
+        if not _OF_OTHERS.fullmatch(name):
+            yield name, x, units.get(name, "")
     if proof.abscissa:
-        rows.append(("abscissa", *_format_ball(proof.abscissa), per))
-    if proof.eigenfrequencies:
-        for omega in proof.eigenfrequencies:
-            rows += [(f"eigenfrequency{format_multiplicity(omega.multiplicity)}, re", *_format_ball(omega.re), "")]
-            rows += [("  im", *_format_ball(omega.im), "")]
-        return rows
+        yield "abscissa", proof.abscissa, per
+    for omega in proof.eigenfrequencies:
+        yield f"eigenfrequency{format_multiplicity(omega.multiplicity)}, re", omega.re, ""
+        yield "  im", omega.im, ""
     listed = {number.value for number in proof.unknowns.values()}
-    for root in (r for r in proof.roots if r.re.value not in listed or r.im.value != "0"):
+    for root in () if proof.eigenfrequencies else proof.roots:
         times = format_multiplicity(root.multiplicity)
-        if root.im.value == "0":
-            rows.append((f"root{times}", *_format_ball(root.re), per))
-        elif not root.im.value.startswith("-"):
-            rows += [(f"pair{times}, re", *_format_ball(root.re), per), ("  im ±", *_format_ball(root.im), per)]
-    return rows
+        if root.im.value != "0" and not root.im.value.startswith("-"):
+            yield f"pair{times}, re", root.re, per
+            yield "  im ±", root.im, per
+        elif root.im.value == "0" and root.re.value not in listed:
+            yield f"root{times}", root.re, per
 
 
 def _find_units(problem: Posed, proof: Proof) -> dict[str, str]:
@@ -125,7 +126,7 @@ def _find_units(problem: Posed, proof: Proof) -> dict[str, str]:
     return units
 
 
-def _describe_method(problem: Posed, proof: Proof) -> Iterator[Sentence]:
+def _describe_method(problem: Posed, proof: Proof) -> Parts:
     """How it was proved, how near the stored design is, and how alone."""
     if proof.method == "exact factorisation":
         yield Sentence("square-free factorisation of the polynomial, whose coefficients are fractions", "method")
@@ -134,18 +135,16 @@ def _describe_method(problem: Posed, proof: Proof) -> Iterator[Sentence]:
     else:
         equations = len(proof.unknowns) + len(proof.moved) > problem.model.degree
         also = " and the == constraints" if equations else ""
-        yield Sentence(
-            f"Krawczyk's interval Newton test on the equations a_k = a0 c_k, c_k the coefficients of the pattern{also}",
-            "method",
-        )
+        equal = "a_k = a0 c_k, c_k the coefficients of the pattern"
+        yield Sentence(f"Krawczyk's interval Newton test on the equations {equal}{also}", "method")
         alone = f"no other such design within {proof.uniqueness:.2g} in each number"
-        yield Sentence(f"error at most {proof.radius:.1e} before rounding to these digits; {alone}")
+        yield f"error at most {proof.radius:.1e} before rounding to these digits; {alone}"
         explained = f"rounding to doubles can explain {proof.explained:.1e}"
-        yield Sentence(f"the stored design differs from it by {proof.distance:.1e}; {explained}")
+        yield f"the stored design differs from it by {proof.distance:.1e}; {explained}"
 
 
-def _write_facts(proof: Proof) -> Iterator[Sentence]:
-    of = " (of the design as stored)" if proof.stored and proof.reason else ""
+def _write_facts(proof: Proof) -> Parts:
+    of = " (of the stored design)" if proof.stored and proof.reason else ""
     asked = "EP" in proof.pattern and proof.defective != NOT_CHECKED
     if asked or proof.geometric_multiplicity is not None:
         yield _write_verdict(f"defective{of}", proof.defective)
@@ -156,14 +155,12 @@ def _write_facts(proof: Proof) -> Iterator[Sentence]:
     yield from (Sentence(str(verdict), name) for name, verdict in proof.limits.items())
 
 
-def _write_exact_numbers(problem: Posed, proof: Proof) -> Iterator[Sentence]:
+def _write_exact_numbers(problem: Posed, proof: Proof) -> Parts:
     """Numbers that were taken exactly, and a word on angles."""
-    exact = [*(f"{name} = {_format_fraction(value)}" for name, value in proof.held.items()), *proof.numbers]
-    if exact:
-        yield Sentence(", ".join(exact), "exact numbers")
-    of = problem.parameter_set
-    angles = [n for n in proof.held if n in of.names and of[n].tangent and n not in proof.stated]
-    if angles := [n for n in angles if proof.parameters[n].value != "0"]:
+    held = (f"{name} = {_format_fraction(value)}" for name, value in proof.held.items())
+    yield Sentence(", ".join((*held, *proof.numbers)), "exact numbers")
+    tangents = {p.name for p in problem.parameter_set.parameters if p.tangent} - set(proof.stated)
+    if angles := [n for n in proof.held if n in tangents and proof.parameters[n].value != "0"]:
         yield Sentence("the decimal of the double in radians, not an angle in degrees", ", ".join(angles))
 
 
@@ -176,52 +173,43 @@ def _format_fraction(text: str) -> str:
     return decimal.value if decimal.radius == "0" and len(decimal.value) <= len(text) + 1 else text
 
 
-def _format_ball(number: Number) -> tuple[str, str]:
-    return number.value if float(number.value) else "0", "exact" if number.radius == "0" else f"± {number.radius}"
-
-
 def _write_verdict(label: str, verdict: Verdict) -> Sentence:
     answer = {True: "yes", False: "no", None: "not decided"}[verdict.holds]
     return Sentence(f"{answer}, {verdict.words}", label)
 
 
-def summarise_every(every: Every) -> Iterator[Badge]:
-    """How many designs, and whether they are all."""
-    yield Badge(count_things(len(every.solutions), "design"))
-    complete = every.completeness is not None and every.completeness.complete
-    yield Badge("proved to be all", "good") if complete else Badge("not proved to be all")
-
-
-def write_every(every: Every, _level: Level) -> Iterator[Chapter]:
+def write_every(every: Every, _level: Level) -> Parts:
     """All designs with a pattern, one column each, and what the proof or the search says about others."""
     found, coverage, proof = every.solutions, every.coverage, every.completeness
     complete = proof is not None and proof.complete
-    many = count_things(len(found), "solution")
+    verdict = Badge("proved to be all", "good") if complete else "not proved to be all"
+    yield count_things(found, "design"), verdict
+    many = count_things(found, "solution")
     effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
     if not found:
         none = f"no design in the box and within the limits has the pattern (proved; {effort})"
-        answer = Sentence(none if complete else "no isolated solution was found", tone="answer")
-        yield Chapter("answer", (answer,))
+        yield Sentence(none if complete else "no isolated solution was found", tone="answer")
     else:
         all_of_them = f"{many} in the box, no other exists (proved; {effort})"
         located = all_of_them if complete else f"{many} in the box"
-        yield Chapter("answer", (Sentence(located, f"locate {found[0].problem.locate}", "answer"),))
-        yield Chapter("designs", (TableBlock(_list_designs(every, complete), "Designs with the pattern"),), "", "wide")
-    lines = [*(_describe_proof(proof, effort) if proof else ()), *(_describe_coverage(coverage) if coverage else ())]
-    yield Chapter("proof", tuple(map(Sentence, lines)))
+        yield Sentence(located, f"locate {found[0].problem.locate}", "answer")
+        yield Chapter("designs", width="wide")
+        yield TableBlock(_list_designs(every, complete), "Designs with the pattern")
+    yield Chapter("proof")
+    yield from _describe_proof(proof, effort) if proof else ()
+    yield from _describe_coverage(coverage) if coverage else ()
 
 
-def _list_designs(every: Every, complete: bool) -> list[Sequence[Cell | str]]:
+def _list_designs(every: Every, complete: bool) -> list[Row]:
     found, problem = every.solutions, every.solutions[0].problem
     names = [n for n in found[0].parameters if n in problem.free]
-    off: Sequence[Mapping[str, float]] = every.errors or ({},) * len(found)
-    pairs = list(zip(found, off, strict=True))
-    rows: list[Sequence[Cell | str]] = [("design", *(str(k) for k in range(1, len(found) + 1)))]
-    rows += [(n, *(Cell(s.parameters[n], error=e.get(n, 0.0)) for s, e in pairs)) for n in names]
+    pairs = [*zip(found, every.errors or [{} for _ in found], strict=True)]
     units = [unit_at(problem.posed, "abscissa", s.parameters) for s in found]
+    rows: list[Row] = [("design", *(str(k) for k in range(1, len(found) + 1)))]
+    rows += [(n, *(Cell(s.parameters[n], error=e.get(n, 0.0)) for s, e in pairs)) for n in names]
     decays = [Cell(s.abscissa, u, error=e.get("abscissa", 0.0)) for (s, e), u in zip(pairs, units, strict=True)]
     rows += [(f"abscissa {units[0].text}".rstrip(), *decays), ("structure", *(s.structure for s in found))]
-    rows += [("met", *(str(h) for h in every.coverage.hits))] if every.coverage else []
+    rows += [("met", *map(str, every.coverage.hits))] if every.coverage else []
     rows += [("proved", *map(say_whether, every.proved))] if any(every.proved) and not complete else []
     return rows
 
@@ -241,20 +229,11 @@ def _describe_proof(proof: Completeness, effort: str) -> Iterator[str]:
 def _describe_coverage(coverage: Coverage) -> Iterator[str]:
     if coverage.crossings:
         yield f"{coverage.crossings} starts ended where roots meet in a {CROSSING}"
-    doubt = (
-        f"; {coverage.singular} ended at designs with the pattern where its equations are singular: one of a "
-        "continuum of solutions, or one where two meet (tmsopt solve shows one)"
-        if coverage.singular
-        else ""
-    )
+    singular = f"; {coverage.singular} ended at designs with the pattern where its equations are singular: "
+    singular += "one of a continuum of solutions, or one where two meet (tmsopt solve shows one)"
+    doubt = singular if coverage.singular else ""
     yield (
         f"coverage of a search: {coverage.starts} starts over the box{doubt}; "
         f"{coverage.expected:.2f} solutions to be expected in all; "
         f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"
     )
-
-
-MAKERS: Mapping[str, Maker] = {
-    "Proof": Maker(summarise_proof, write_proof, "draw_roots"),
-    "Every": Maker(summarise_every, write_every, "draw_designs"),
-}

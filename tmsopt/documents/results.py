@@ -2,15 +2,15 @@
 
 import math
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib import import_module
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from tmsopt.documents.blocks import Chapter, Document, Level
-from tmsopt.documents.maker import Maker
-from tmsopt.documents.text import WIDTH, to_headline, to_text
+from tmsopt.documents.blocks import Badge, Block, Chapter, Document, Level, Parts, Sentence
+from tmsopt.documents.text import to_headline, to_text
 from tmsopt.errors import Fault, InputError, short
 from tmsopt.files import as_path, write_text
 from tmsopt.progress import Listener, start_steps
@@ -21,23 +21,30 @@ if TYPE_CHECKING:
 
     from tmsopt.problem import Solution
 
-_HOMES = {
-    "solution": "Solution",
-    "explanation": "Explanation Optimality Diagnosis",
-    "robustness": "Robustness Nearest",
-    "speeds": "Speeds Growth",
-    "motion": "Simulation",
-    "curves": "Trace Branch Domain Swallowtail",
-    "charts": "Chart",
-    "fronts": "Front",
-    "studies": "Results",
-    "proofs": "Proof Every",
-    "paper": "Comparison Ledger",
-    "descriptions": "Description",
+_RESULTS = {
+    "solution": {"Solution": "draw_growth"},
+    "explanation": {"Explanation": "draw_rounding", "Optimality": "draw_roots", "Diagnosis": "draw_splitting"},
+    "robustness": {"Robustness": "draw_robustness", "Nearest": "draw_robustness"},
+    "motion": {"Speeds": "draw_speeds", "Growth": "draw_growth", "Simulation": "draw_motion"},
+    "curves": {
+        "Trace": "draw_trace",
+        "Branch": "",
+        "Domain": "draw_domain",
+        "Swallowtail": "draw_swallowtail",
+        "Chart": "draw_chart",
+    },
+    "fronts": {"Front": "draw_front"},
+    "studies": {"Results": "draw_histogram"},
+    "proofs": {"Proof": "draw_roots", "Every": "draw_designs"},
+    "paper": {"Comparison": "draw_comparison", "Ledger": "draw_ledger"},
+    "descriptions": {"Description": ""},
 }
-"""Module → the results that it shows; it is loaded when one of them is shown."""
+"""Module → the results that it shows, each with what draws it in `tmsopt.plots`, empty where nothing does.
 
-HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+The module, loaded when one of them is shown, has for each a generator of its parts, such as `write_solution`.
+"""
+
+HOME = {name: module for module, names in _RESULTS.items() for name in names}
 """Class of a result → the module that shows it."""
 
 ENDINGS = ("html", "htm")
@@ -50,18 +57,38 @@ def document_of(result: Any, level: Level = "brief", **options: Any) -> Document
     """The document of a result.
 
     Args:
-        options: of its maker, such as `si` of a solution.
+        options: of its writer, such as `si` of a solution.
     """
-    maker = maker_of(result)
-    sections = tuple(section for section in maker.sections(result, level, **options) if section.blocks)
-    return Document(type(result).__name__, title_of(result), tuple(maker.words(result)), level, sections)
+    cover, parts = _open(result, level, **options)
+    blocks: list[Block] = []
+    chapters = {Chapter("answer"): blocks}
+    for part in parts:
+        match part:
+            case Chapter():
+                blocks = chapters.setdefault(part, [])
+            case "" | Sentence("") | tuple():
+                continue
+            case str():
+                blocks.append(Sentence(part))
+            case _:
+                blocks.append(part)
+    filled = (replace(chapter, blocks=tuple(blocks)) for chapter, blocks in chapters.items() if blocks)
+    return replace(cover, sections=tuple(filled))
 
 
-def maker_of(result: Any) -> Maker:
-    """Who shows a result."""
+def _open(result: Any, level: Level, **options: Any) -> tuple[Document, Parts]:
+    """The document without its chapters, and the parts that these are made of."""
     name = type(result).__name__
-    makers: Mapping[str, Maker] = import_module(f"tmsopt.documents.{HOME[name]}").MAKERS
-    return makers[name]
+    module: Any = import_module(f"tmsopt.documents.{HOME[name]}")
+    parts = getattr(module, f"write_{name.lower()}")(result, level, **options)
+    words = [Badge(word) if isinstance(word, str) else word for word in next(parts)]
+    return Document(name, title_of(result), tuple(word for word in words if word.text), level), parts
+
+
+def picture_of(result: Any) -> str:
+    """The name in `tmsopt.plots` of what draws a result; empty where nothing does."""
+    name = type(result).__name__
+    return _RESULTS[HOME[name]][name]
 
 
 def report(result: Any, full: bool = False) -> str:
@@ -71,8 +98,8 @@ def report(result: Any, full: bool = False) -> str:
 
 def headline(result: Any) -> str:
     """What it is and how it ended, then its title as far as there is room."""
-    escape_text = tuple(maker_of(result).words(result))
-    return to_headline(Document(type(result).__name__, title_of(result), escape_text, "brief"), WIDTH)
+    cover, _ = _open(result, "brief")
+    return to_headline(cover)
 
 
 def title_of(result: Any) -> str:
@@ -96,7 +123,7 @@ def draw(result: Any, ax: "Axes | None" = None) -> "Axes":
 
     if not isinstance(ax, Axes | None):
         raise InputError([Fault(f"found {type(ax).__name__}; accepted: Axes of Matplotlib, or None", ("ax",))])
-    if not (name := maker_of(result).picture):
+    if not (name := picture_of(result)):
         advice = "plot a solution of it, or the result that it is a part of"
         raise InputError([Fault(f"there is no picture of a {type(result).__name__} alone; {advice}")])
     axes: Axes = getattr(plots, name)(result, ax=ax)
@@ -171,44 +198,36 @@ def save_report(
     place = as_path(path, "the file to write")
     if place.suffix.lstrip(".").lower() not in ENDINGS:
         raise InputError([Fault(f"found '{place}'; accepted: a file name ending in {', '.join(ENDINGS)}", ("path",))])
-    from tmsopt.documents.html import to_page
+    from tmsopt.documents.explored import frame_explorer
+    from tmsopt.documents.html import mark_verbatim, to_page
 
     steps = start_steps(progress, "writing the page", "part")
     options: dict[str, dict[str, Any]] = {"Solution": {"full": full}, "Proof": {"design": design}}
     document = document_of(result, "page", **options.get(type(result).__name__, {}))
     if steps:
         steps(1, math.nan, "the document is done")
-    more = _origin(result, command, files or {}, seed, full, design)
+    text = mark_verbatim(report(result, full), "report as text")
+    origin = _mark_origin({"command": command, **(files or {})}, getattr(getattr(result, "study", None), "seed", seed))
+    more = (
+        (Chapter("explorer", width="whole"), frame_explorer(result, design)),
+        (Chapter("text", "As text", "whole"), f"<details><summary>The report as text</summary>{text}</details>"),
+        (Chapter("origin", "Where it is from", "whole"), origin),
+    )
     write_text(place, to_page(document, more))
 
 
-def _origin(
-    result: Any, command: str, files: Mapping[str, str], seed: int | None, full: bool, design: "Solution | None"
-) -> Iterator[tuple[Chapter, str]]:
-    """The explorer, the report as text, then versions, system, date, seed, command and files."""
-    from tmsopt.documents.explored import frame_explorer
+def _mark_origin(texts: Mapping[str, str], seed: int | None) -> str:
+    """Versions, system, date, seed, then the command and the files."""
     from tmsopt.documents.html import escape_text, mark_list, mark_verbatim
 
-    yield Chapter("explorer", (), "Explorer", "whole"), frame_explorer(result, design)
-    text = mark_verbatim(report(result, full), "report as text")
-    yield (
-        Chapter("text", (), "As text", "whole"),
-        f"<details><summary>The report as text</summary>{text}</details>",
-    )
-    seed = getattr(getattr(result, "study", None), "seed", seed)
-    about = {
-        **{name: found or "" for name, found in installed_versions(_PACKAGES).items()},
+    about = {name: found or "" for name, found in installed_versions(_PACKAGES).items()} | {
         "Python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}".strip(),
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "seed": "" if seed is None else str(seed),
     }
-    texts = "\n".join(
-        f"<h3>{escape_text(n)}</h3>\n{mark_verbatim(t, n)}"
-        for n, t in ({"command": command} | dict(files)).items()
-        if t
-    )
-    yield Chapter("origin", (), "Where it is from", "whole"), mark_list(about.items()) + texts
+    marked = (f"<h3>{escape_text(name)}</h3>\n{mark_verbatim(text, name)}" for name, text in texts.items() if text)
+    return mark_list(about.items()) + "\n".join(marked)
 
 
 def response(solution: Any, **asked: Any) -> Any:

@@ -1,12 +1,11 @@
 """How far the boundaries of a design are."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 
 from tmsopt.boundaries.nearest import Nearest, Robustness
-from tmsopt.documents.blocks import Badge, Cell, Chapter, Level, Sentence, TableBlock
-from tmsopt.documents.maker import Maker
-from tmsopt.models import Model, in_words_of, words_of
+from tmsopt.documents.blocks import Cell, Chapter, Level, Parts, Sentence, TableBlock, judge
+from tmsopt.models import in_words_of, words_of
 from tmsopt.problem.unit_system import unit_of
 
 _MAIN = 0.5
@@ -21,19 +20,13 @@ _OF_H = {"weave": "a real eigenfrequency"}
 _ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
 
 
-def summarise_robustness(found: Robustness) -> Iterator[Badge]:
-    """How far stability reaches, and to what."""
-    if found.stable is not None:
-        yield Badge("stable", "good") if found.stable else Badge("not stable", "bad")
-    yield Badge(_format_value("radius" if found.stable else "to stability", found.limit.distance))
-    if found.limit.found:
-        yield Badge(f"to {found.limit.kind}")
-
-
-def write_robustness(found: Robustness, _level: Level) -> Iterator[Chapter]:
+def write_robustness(found: Robustness, _level: Level) -> Parts:
     """The sentence, then the nearest point of every boundary."""
-    yield Chapter("answer", (Sentence(describe_robustness(found), "robustness", "answer"),))
-    yield Chapter("boundaries", (tabulate_boundaries(found),))
+    radius = _format_value("radius" if found.stable else "to stability", found.limit.distance)
+    yield judge(found.stable, "stable"), radius, f"to {found.limit.kind}" if found.limit.found else ""
+    yield Sentence(describe_robustness(found), "robustness", "answer")
+    yield Chapter("boundaries")
+    yield tabulate_boundaries(found)
 
 
 def describe_robustness(found: Robustness, on_edge: bool = False) -> str:
@@ -55,68 +48,54 @@ def describe_robustness(found: Robustness, on_edge: bool = False) -> str:
         return f"{'' if found.stable else 'not stable; '}no change in reach of the search makes it {other}"
     if not found.stable:
         return f"not stable; {_describe_size(found)} makes it stable{_name_largest(limit)}"
-    return f"{_describe_size(found)} {_describe_event(found.problem.model, limit.kind)}{_name_largest(limit)}"
-
-
-def _describe_event(model: Model, kind: str) -> str:
-    how = "a root passes through infinity, a0 = 0" if kind == "infinity" else words_of(model)[kind]
-    return f"makes it unstable ({how})"
+    how = words_of(found.problem.model).get(limit.kind, "a root passes through infinity, a0 = 0")
+    return f"{_describe_size(found)} makes it unstable ({how}){_name_largest(limit)}"
 
 
 def tabulate_boundaries(found: Robustness) -> TableBlock:
     """The nearest point of every boundary: its distance and the change of each parameter."""
-    names = list(found.weights)
+    names, model = list(found.weights), found.problem.model
     kinds: tuple[Nearest, ...] = (found.weave, found.capsize, found.infinity, found.heavy_damping)
-    kinds = kinds if found.problem.model.carrier is None else kinds[:1]
-    rows: list[Sequence[str]] = [("relative changes" if found.relative else "changes over weights", "distance", *names)]
-    for n in kinds:
-        moves = _format_moves(n, found.relative) if n.found and n.distance else ["" for _ in names]
-        rows.append((_name_row(n, found), _format_distance(n, found), *moves))
     units = {name: unit_of(found.problem.posed, name) for name in names}
-    rows.append(("weight", "", *(units[name].show(found.weights[name], 6) for name in names)))
-    for n in kinds:
+    rows: list[Sequence[str]] = [("relative changes" if found.relative else "changes over weights", "distance", *names)]
+    places: list[Sequence[str]] = []
+    for n in kinds if model.carrier is None else kinds[:1]:
+        distance = "" if n.found else "none found"
+        moves = ["" for _ in names]
         if n.found and n.distance > 0:
-            word = in_words_of(found.problem.model, n.kind)
-            rows.append((f"values at {word}", "", *(units[name].show(n.parameters[name], 8) for name in names)))
+            distance = _format_percent(n.distance) if found.relative else f"{n.distance:.4g}"
+            moves = _format_moves(n, found.relative)
+            places.append(
+                (
+                    f"values at {in_words_of(model, n.kind)}",
+                    "",
+                    *(units[name].show(n.parameters[name], 8) for name in names),
+                )
+            )
+        rows.append((_name_row(n, found), distance, *moves))
+    rows += [("weight", "", *(units[name].show(found.weights[name], 6) for name in names)), *places]
     transposed = len(names) > _WIDE
     return TableBlock(list(zip(*rows, strict=True)) if transposed else rows, "Nearest points of the boundaries")
 
 
-def summarise_nearest(nearest: Nearest) -> Iterator[Badge]:
-    """Which boundary, and how far."""
-    yield Badge(nearest.kind)
-    yield Badge(_format_value("distance", nearest.distance) if nearest.found else "none found")
-
-
-def write_nearest(found: Nearest, _level: Level) -> Iterator[Chapter]:
+def write_nearest(found: Nearest, _level: Level) -> Parts:
     """How far one boundary is, then its nearest point and the change of each parameter in weights."""
+    yield found.kind, _format_value("distance", found.distance) if found.found else "none found"
     if not found.found:
-        yield Chapter("answer", (Sentence(f"no point of the boundary of {found.kind} was found"),))
+        yield f"no point of the boundary of {found.kind} was found"
         return
     crossing = "" if found.refined else ", the nearest crossing seen"
-    yield Chapter("answer", (Sentence(f"{found.distance:.6g} in weights{crossing}", f"to {found.kind}", "answer"),))
-    rows: list[Sequence[Cell | str]] = [("", "there", "change in weights")]
-    rows += [(n, Cell(found.parameters[n], digits=8), f"{change:+.4g}") for n, change in found.direction.items()]
-    yield Chapter("boundary", (TableBlock(rows, "Nearest point of the boundary"),))
+    yield Sentence(f"{found.distance:.6g} in weights{crossing}", f"to {found.kind}", "answer")
+    yield Chapter("boundary")
+    rows = [(n, Cell(found.parameters[n], digits=8), f"{change:+.4g}") for n, change in found.direction.items()]
+    yield TableBlock((("", "there", "change in weights"), *rows), "Nearest point of the boundary")
 
 
 def _name_row(n: Nearest, found: Robustness) -> str:
     to = "at the edge of" if n.distance == 0 else "change to"
     if n.kind != "heavy damping":
         return f"{to} {in_words_of(found.problem.model, n.kind)}"
-    return (
-        f"{to} {n.kind}"
-        if n.distance == 0
-        else f"{'change out of' if found.heavily_damped else 'change into'} {n.kind}"
-    )
-
-
-def _format_distance(n: Nearest, found: Robustness) -> str:
-    if not n.found:
-        return "none found"
-    if n.distance == 0:
-        return ""
-    return _format_percent(n.distance) if found.relative else f"{n.distance:.4g}"
+    return f"{to} {n.kind}" if n.distance == 0 else f"change {'out of' if found.heavily_damped else 'into'} {n.kind}"
 
 
 def _format_moves(n: Nearest, relative: bool) -> list[str]:
@@ -137,7 +116,7 @@ def _name_largest(limit: Nearest) -> str:
 def _describe_size(found: Robustness) -> str:
     if found.relative:
         return f"a change of {_format_percent(found.limit.distance)}"
-    return f"a change of {found.limit.distance:.2g} in {'your' if found.problem.weights else 'the'} weights"
+    return f"a change of {found.limit.distance:.2g} times {'your' if found.problem.weights else 'the'} weights"
 
 
 def _format_percent(x: float, sign: str = "") -> str:
@@ -148,9 +127,3 @@ def _format_percent(x: float, sign: str = "") -> str:
 
 def _format_value(name: str, value: float) -> str:
     return f"{name} = {value:.5g}" if math.isfinite(value) else f"no {name}"
-
-
-MAKERS: Mapping[str, Maker] = {
-    "Robustness": Maker(summarise_robustness, write_robustness, "draw_robustness"),
-    "Nearest": Maker(summarise_nearest, write_nearest, "draw_robustness"),
-}

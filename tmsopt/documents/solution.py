@@ -1,25 +1,28 @@
 """The report of a solution: the answer first, then what it does, its limits, how sure it is, and how to see more."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 
 from tmsopt import plots
-from tmsopt.analysis import Lever, bound_lines, proof_line, structure_line
+from tmsopt.analysis import Explanation, Lever, bound_lines, proof_line, structure_line
 from tmsopt.documents.analysis import Analysis
 from tmsopt.documents.blocks import (
     ALL,
     Badge,
-    Block,
     Cell,
     Chapter,
     Figure,
     Level,
+    Parts,
     Sentence,
     TableBlock,
     Tone,
     Verbatim,
+    count_things,
 )
 from tmsopt.documents.design_rows import (
+    BRIEF,
+    PERCENT,
     convert_to_si,
     describe_inertia,
     describe_loads,
@@ -28,51 +31,46 @@ from tmsopt.documents.design_rows import (
     describe_roots,
     describe_speed,
     describe_stored,
+    list_cases,
     list_parameters,
     list_quantities,
-    name_role,
     parameters_of_worst_case,
-    round_to_zero,
+    tabulate_parameters,
 )
-from tmsopt.documents.explanation import describe_rounding, explain_diagnosis, explain_optimality, tabulate_rounding
-from tmsopt.documents.maker import Maker, remove_titles
+from tmsopt.documents.explanation import describe_rounding, tabulate_rounding, write_diagnosis, write_optimality
+from tmsopt.documents.motion import describe_range
 from tmsopt.documents.robustness import describe_robustness, tabulate_boundaries
-from tmsopt.documents.speeds import describe_range
 from tmsopt.evaluation import abscissa_as_stored
 from tmsopt.guide import describe
 from tmsopt.models import tms
-from tmsopt.problem import NO_RADIUS, Case, Unit, amounts_text, common_unit, show_at, status_text, unit_of
+from tmsopt.problem import NO_RADIUS, Case, Problem, amounts_text, common_unit, show_at, status_text, unit_of
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import limit_text
 from tmsopt.problem.verdict.stability import ROUNDED, STABLE, UNSTABLE
 from tmsopt.problem.verdict.status import describe_status, describe_verdict
+from tmsopt.records import Numbers
 
-_DIGITS = 5
 _FOLD, _FIXED = 5, 14  # rows of free parameters below each other, and fixed ones named, of a brief report
 _LIMITS = 3  # limits that a brief report shows
 _OTHER = {"a0": "must not be 0", "coefficients": "must have values"}
 
-Blocks = Iterator[Block]
 
-
-def summarise_solution(solution: Solution) -> Iterator[Badge]:
+def _summarise(solution: Solution) -> tuple[Badge | str, ...]:
     """Status, objective, structure, proof, stability."""
-    problem = solution.problem.posed
-    yield Badge(status_text(problem, solution.status), "good" if solution.status == "optimal" else "bad")
+    problem, stability = solution.problem.posed, solution.stability
     asked = problem.minimize or problem.maximize
     name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
-    yield Badge(f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}")
-    if stored := abscissa_as_stored(solution):
-        yield Badge(stored)
-    if solution.missed:
-        yield Badge(f"misses {amounts_text(problem, solution.missed)}")
-    yield Badge(solution.structure)
-    if solution.bound.proven:
-        yield Badge("proved", "good")
-    if verdict := solution.stability.verdict:
-        rounded = ROUNDED if solution.stability.on_edge and not solution.edge_is_exact else ""
-        growth = f" as {solution.stability.growth}" if solution.stability.growth else ""
-        yield Badge(f"{verdict}{growth}{rounded}", judge_tone(solution))
+    rounded = ROUNDED if stability.on_edge and not solution.edge_is_exact else ""
+    growth = f" as {stability.growth}" if stability.growth else ""
+    return (
+        Badge(status_text(problem, solution.status), "good" if solution.status == "optimal" else "bad"),
+        f"{' '.join(name.split())} = {show_at(problem, name, solution.parameters, value)}",
+        abscissa_as_stored(solution),
+        f"misses {amounts_text(problem, solution.missed)}" if solution.missed else "",
+        solution.structure,
+        Badge("proved" if solution.bound.proven else "", "good"),
+        Badge(f"{stability.verdict}{growth}{rounded}" if stability.verdict else "", judge_tone(solution)),
+    )
 
 
 def write_solution(
@@ -80,9 +78,9 @@ def write_solution(
     level: Level,
     *,
     full: bool = False,
-    si: Mapping[str, float] | None = None,
+    si: Numbers | None = None,
     tabulated: bool = False,
-) -> Iterator[Chapter]:
+) -> Parts:
     """The parts of the report in order.
 
     Args:
@@ -90,67 +88,66 @@ def write_solution(
         si: parameters in SI, such as `si_parameters` gives for another scale: a brief report shows them then.
         tabulated: whether a brief report, too, has every parameter with its meaning.
     """
+    yield _summarise(solution)
     analysis, scaled = solution.analysis, si or convert_to_si(solution)
     full, page, brief = full or level == "full", level == "page", level == "brief"
-    first = "conflict" if solution.status == "infeasible" else "answer"
-    yield Chapter(first, tuple(_write_answer(solution, analysis, brief, full)))
+    found = analysis.full_explanation if full else analysis.explanation
+    yield Chapter("conflict" if solution.status == "infeasible" else "answer")
+    yield from _write_answer(solution, analysis, brief, full)
     if page:
         yield from write_bicycle(solution)
-    notes = (Sentence(note, "note") for note in solution.notes)
-    yield Chapter(
-        "design",
-        (*_write_design(solution, scaled, brief and not tabulated, si is not None), *notes),
-        "Parameters",
-        "wide",
-    )
-    yield Chapter("motion", tuple(_write_motion(solution, analysis, scaled, brief)))
+    yield Chapter("design", "Parameters", "wide")
+    yield from _write_design(solution, scaled, brief and not tabulated, si is not None)
+    yield from (Sentence(note, "note") for note in solution.notes)
+    yield Chapter("motion")
+    yield from _write_motion(solution, analysis, brief)
     if page:
         yield from write_growth_picture(solution)
-    yield Chapter("cases", tuple(_write_cases(solution)))
-    limits, sureness = _write_limits(solution, analysis, full, page), _write_sureness(solution, analysis, brief, full)
+    yield Chapter("cases")
+    if solution.worst is not None:
+        yield from _write_cases(solution, solution.worst)
+    yield Chapter("limits", width="wide")
+    yield from _write_limits(solution, found, full, page)
+    if not brief:
+        yield Chapter("sureness", "How sure it is")
+    yield from _write_sureness(solution, found, brief, full)
     if brief:
-        yield Chapter("limits", (*limits, *sureness, _suggest_more(solution, analysis)))
+        yield _suggest_more(solution, analysis)
         return
-    yield Chapter("limits", tuple(limits), "", "wide")
-    yield Chapter("sureness", tuple(sureness), "How sure it is")
     if full:
-        yield Chapter("roots", tuple(_write_roots(solution, analysis)))
-    rows = list_quantities(solution, scaled)
+        yield Chapter("roots")
+        if solution.multiple_as_rounded:
+            yield "roots coincide up to rounding errors; tmsopt prove tells it of the numbers as typed"
+        for diagnosis in analysis.diagnoses:
+            yield from write_diagnosis(diagnosis)
+    yield Chapter("quantities", "Derived quantities", "wide")
     head = ("quantity", "value", "unit", "in SI", "meaning")
-    yield Chapter("quantities", (TableBlock((head, *rows), "Quantities of the design"),), "Derived quantities", "wide")
-    yield Chapter("search", tuple(_write_search(solution)))
+    yield TableBlock((head, *list_quantities(solution, scaled)), "Quantities of the design")
+    yield Chapter("search")
+    yield from _write_search(solution)
 
 
-def write_bicycle(solution: Solution) -> Iterator[Chapter]:
+def write_bicycle(solution: Solution) -> Parts:
     """The bicycle to scale, or the sketch that its model has."""
+    yield Chapter("bicycle")
     if solution.problem.model is tms:
         caption = "The bicycle from its right side, to scale, in wheelbases; z points down"
-        yield Chapter("bicycle", (Figure(lambda: plots.draw_bicycle(solution), caption),))
+        yield Figure(plots.draw_bicycle, solution, caption)
     elif sketch := describe(solution).sketch:
-        yield Chapter("bicycle", (Verbatim(sketch, "sketch of the model, not to scale"),))
+        yield Verbatim(sketch, "sketch of the model, not to scale")
 
 
-def write_growth_picture(solution: Solution) -> Iterator[Chapter]:
+def write_growth_picture(solution: Solution) -> Parts:
     """Growth rates and frequencies over the speed, or the first parameter."""
     from tmsopt.dynamics import growth
 
     try:
-        found = growth(remove_titles(solution))
+        found = growth(solution)
     except Exception:  # a root at infinity, or nothing that could vary: nothing to draw
         return
+    yield Chapter("growth", "Growth and frequencies")
     caption = f"Growth rates and frequencies over {found.over.name}; stable where it is shaded"
-    figure = Figure(lambda: plots.growth_figure(found), caption)
-    yield Chapter("growth", (figure,), "Growth and frequencies")
-
-
-def tabulate_parameters(solution: Solution, si: Mapping[str, float]) -> TableBlock:
-    """Every parameter with its role, its range, what it is in the other set, and its meaning."""
-    ranges = {w.name: w.given for of in describe(solution).sets for w in of.parameters}
-    other = "without units" if solution.problem.posed.parameter_set.rate is not None else "in SI"
-    rows: list[Sequence[Cell | str]] = [("parameter", "value", "unit", "free or fixed", "range", other, "meaning")]
-    for name, value, unit, how, also, meaning in list_parameters(solution, si):
-        rows.append((name, value, unit, how, ranges[str(name)] if how == "free" else "", also, meaning))
-    return TableBlock(rows, "Parameters of the design")
+    yield Figure(plots.growth_figure, found, caption)
 
 
 def write_headline(solution: Solution) -> tuple[Sentence, Sentence]:
@@ -174,129 +171,105 @@ def judge_tone(solution: Solution) -> Tone:
     return "good" if solution.stability.verdict == STABLE else "doubt"
 
 
-def _write_answer(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Blocks:
+def _write_answer(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Parts:
     ended, asked = write_headline(solution)
     obstacles, further = analysis.obstacles
     if solution.status == "infeasible":
         joined = ": " not in ended.text and obstacles
         yield Sentence(f"{ended.text}: {obstacles[0]}" if joined else ended.text, tone="bad")
-        yield from map(Sentence, obstacles[1:] if joined else obstacles)
-        yield from (Sentence(text, "violated") for text in _list_violations(solution))
+        yield from obstacles[1:] if joined else obstacles
+        for name, value in solution.violations.items():
+            unit = unit_of(solution.problem.posed, name)
+            by = f" by {unit.show(value, 4)}" if math.isfinite(value) else ", which has no value"
+            by = "" if name in _OTHER else by
+            yield Sentence(f"{name} ({_describe_limit(solution, name)}){by}", "violated")
         yield Sentence(asked.text, "nearest design")
     else:
-        yield from (ended, asked, *map(Sentence, obstacles))
-    yield from map(Sentence, further if full else ())
+        yield ended
+        yield asked
+        yield from obstacles
+    yield from further if full else ()
     yield Sentence(proof_line(solution), "proof")
-    active = [
-        f"{name} ({text})" if (text := limit_text(solution.problem.posed, name)) else name for name in solution.active
-    ]
-    if brief and active:
+    if brief:
+        active = (f"{name} ({_describe_limit(solution, name)})".removesuffix(" ()") for name in solution.active)
         yield Sentence(", ".join(active), "active limits")
 
 
-def _list_violations(solution: Solution) -> Iterator[str]:
+def _describe_limit(solution: Solution, name: str) -> str:
     problem = solution.problem.posed
-    for name, value in solution.violations.items():
-        asked = limit_text(problem, name) or ("pattern" if name in problem.located else _OTHER.get(name, ""))
-        by = f" by {unit_of(problem, name).show(value, 4)}" if math.isfinite(value) else ", which has no value"
-        yield f"{name} ({asked}){by if name not in _OTHER else ''}"
+    return limit_text(problem, name) or ("pattern" if name in problem.located else _OTHER.get(name, ""))
 
 
-def _write_design(solution: Solution, si: Mapping[str, float], brief: bool, scaled: bool) -> Blocks:
+def _write_design(solution: Solution, si: Numbers, brief: bool, scaled: bool) -> Parts:
     """Free parameters side by side where they are many, and the fixed ones in a sentence; or all in a table."""
     if not brief:
         yield tabulate_parameters(solution, si)
         return
-    problem, of = solution.problem.posed, solution.problem.posed.parameter_set
-    other = {row[0]: row[4] for row in list_parameters(solution, si, _DIGITS)} if scaled else {}
-    cells = {
-        p.name: Cell(round_to_zero(solution, p.name), unit_of(problem, p.name), _DIGITS, named=True)
-        for p in of.parameters
-    }
-    rows = [(p.name, cells[p.name], other.get(p.name, "")) for p in of.parameters if p.name in problem.free]
+    listed = [*list_parameters(solution, si, brief=True)]
+    rows = [(name, cell, also if scaled else "") for name, cell, role, also, _ in listed if role == "free"]
     if rows:
         yield TableBlock((("", "", ""), *rows), fold=_FOLD, tone="answer")
-    rest = [
-        f"{p.name} = {cells[p.name]}"
-        for p in of.parameters
-        if name_role(solution, p.name) == "fixed" and not solution.parameters[p.name] == 0 == p.default
-    ]
+    rest = [f"{name} = {cell}" for name, cell, role, *_ in listed if role == "fixed"]
     more = f", and {len(rest) - _FIXED} more parameters" if len(rest) > _FIXED else ""
-    if rest:
-        yield Sentence(", ".join(rest[:_FIXED]) + more, "fixed", "dim")
+    yield Sentence(", ".join(rest[:_FIXED]) + more, "fixed", "dim")
 
 
-def _write_motion(solution: Solution, analysis: Analysis, si: Mapping[str, float], brief: bool) -> Blocks:
+def _write_motion(solution: Solution, analysis: Analysis, brief: bool) -> Parts:
     at = describe_speed(solution, solution.worst)
     yield Sentence(f"{f'at {at}: ' if at else ''}{describe_motion(solution)}", "motion")
     if analysis.stable_speeds is not None:
-        yield Sentence(describe_range(analysis.stable_speeds, solution))
-    label, text = describe_roots(solution, _DIGITS)
+        yield describe_range(analysis.stable_speeds, solution)
+    label, text = describe_roots(solution, BRIEF)
     yield Sentence(text, label)
     if not brief:
-        yield from map(Sentence, describe_stored(solution))
+        yield from describe_stored(solution)
     if "load_rear" in solution.quantities:
-        yield Sentence(f"{describe_loads(solution)}; {describe_pitching(solution, si)}", "loads")
-    if omits := solution.problem.model.omits:
-        yield Sentence(omits, "model")
-    if inertia := describe_inertia(solution):
-        yield Sentence(inertia, "largest inertia before it becomes unstable, one at a time (radius of gyration)")
+        yield Sentence(f"{describe_loads(solution)}; {describe_pitching(solution)}", "loads")
+    yield Sentence(solution.problem.model.omits, "model")
+    inertia = "largest inertia before it becomes unstable, one at a time (radius of gyration)"
+    yield Sentence(describe_inertia(solution), inertia)
 
 
-def _write_cases(solution: Solution) -> Blocks:
+def _write_cases(solution: Solution, worst: Case) -> Parts:
     """The worst case, and what is known of all of them."""
-    if solution.worst is None:
-        return
-    of, cover = solution.problem, solution.cover
-    yield Sentence(
-        f"{_describe_case(solution, solution.worst)}; motion and roots are of this case, all else is nominal",
-        "worst case",
-    )
-    if solution.least_damped not in (None, solution.worst) and of.model.carrier is None:
+    of, cover, damped, fastest = solution.problem, solution.cover, solution.least_damped, solution.fastest
+    yield Sentence(f"{_describe_case(of, worst)}; motion and roots are of this case, all else is nominal", "worst case")
+    if damped not in (None, worst) and of.model.carrier is None:
         label = "least damped case found" if of.tolerances else "least damped case"
-        yield Sentence(f"{_describe_case(solution, solution.least_damped)}; the damping ratio is of this case", label)
-    if solution.fastest is not None and solution.fastest != solution.worst:
-        text = f"{_describe_case(solution, solution.fastest)}; limits on the frequency apply to this case"
-        yield Sentence(text, "fastest case")
+        yield Sentence(f"{_describe_case(of, damped)}; the damping ratio is of this case", label)
+    if fastest not in (None, worst):
+        yield Sentence(f"{_describe_case(of, fastest)}; limits on the frequency apply to this case", "fastest case")
     if cover is not None:
         means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "by a search, not proved"
         unit = common_unit(of.posed, "abscissa")
         yield Sentence(f"abscissa at most {Cell(cover.limit, unit, named=True)}, {means}", "every case")
 
 
-def _describe_case(solution: Solution, case: Case) -> str:
+def _describe_case(of: Problem, case: Case) -> str:
     """Values of scenarios and errors of parameters in a case."""
-    units = {n: unit_of(solution.problem.posed, n) for n in {**case.at, **case.offset}}
-    at = [f"{n} = {units[n].show(v, 6)}" for n, v in case.at.items()]
-    return ", ".join(
-        [*at, *(f"{n} {'+' if v >= 0 else '−'} {units[n].show(abs(v), 6)}" for n, v in case.offset.items())]
-    )
+    problem = of.posed
+    at = [f"{n} = {unit_of(problem, n).show(v, 6)}" for n, v in case.at.items()]
+    at += [f"{n} {'+' if v >= 0 else '−'} {unit_of(problem, n).show(abs(v), 6)}" for n, v in case.offset.items()]
+    return ", ".join(at)
 
 
-def _write_limits(solution: Solution, analysis: Analysis, full: bool, page: bool) -> Blocks:
-    found = analysis.full_explanation if full else analysis.explanation
-    if page and (rows := list_limits(solution)):
+def _write_limits(solution: Solution, found: Explanation | None, full: bool, page: bool) -> Parts:
+    names = dict.fromkeys((*solution.problem.constraints, *solution.violations))
+    if page and names:
+        rows = ((n, _describe_limit(solution, n), _describe_standing(solution, n)) for n in names)
         yield TableBlock((("limit", "says", "stands"), *rows), "Limits, and how they stand")
-    if found is not None and found.levers:
-        worth = [list_lever(solution, lever) for lever in found.levers]
+    if found is None:
+        return
+    if found.levers:
         head = ("active limit", "value", "if relaxed by", "improvement (first order)")
+        worth = (_list_lever(solution, lever) for lever in found.levers)
         yield TableBlock((head, *worth), "What the active limits are worth", most=_LIMITS)
-        yield from (Sentence(lever.sentence) for lever in found.levers if full)
-    yield from (Sentence(text, "warning", "doubt") for text in (found.warnings if found else ()))
-
-
-def list_limits(solution: Solution) -> list[tuple[str, str, str]]:
-    """Each constraint, and what else is violated: what it says, and whether it holds, is active or is violated."""
-    problem = solution.problem.posed
-    others = [name for name in solution.violations if name not in problem.constraints]
-    said = {
-        n: limit_text(problem, n) or ("pattern" if n in problem.located else "")
-        for n in (*problem.constraints, *others)
-    }
-    return [(name, text, _describe_standing(solution, name)) for name, text in said.items()]
+        yield from (lever.sentence for lever in found.levers if full)
+    yield from (Sentence(text, "warning", "doubt") for text in found.warnings)
 
 
 def _describe_standing(solution: Solution, name: str) -> str:
+    """Whether a limit holds, is active or is violated."""
     if name in solution.violations:
         by, unit = solution.violations[name], unit_of(solution.problem.posed, name)
         return f"violated by {unit.show(by, 4)}" if math.isfinite(by) else "has no value"
@@ -308,20 +281,19 @@ def _describe_margin(solution: Solution, name: str) -> str:
     problem, condition = solution.problem.posed, solution.problem.posed.conditions[name]
     if condition.equality:
         return ""
-    cases = [case for case in problem.cases if not case.direction]
-    cases += [case for case in (solution.worst, solution.least_damped, solution.fastest) if case is not None]
     radius = {n: x for n, x in solution.quantities.items() if n == NO_RADIUS.name}  # the search for it is over
     left = min(
         -condition.sign * float(condition(problem.values(case.applied(solution.parameters)).with_known(radius)))
-        for case in cases or [Case()]
+        for case in list_cases(solution) or [Case()]
     )
-    shares = {q.name for q in (*problem.model.quantities, *problem.parameter_set.quantities) if q.share}
+    quantities = (*problem.model.quantities, *problem.parameter_set.quantities)
     unit = unit_of(problem, name)
-    unit = Unit("%", 0.01) if not unit.text and shares & {*condition.names} else unit
+    if not unit.text and any(q.share and q.name in condition.names for q in quantities):
+        unit = PERCENT
     return f" by {unit.show(left, 4)}" if math.isfinite(left) else ""
 
 
-def list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
+def _list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
     """An active limit: its name, what it says, a small move of it, and what that buys to first order."""
     limit = limit_text(solution.problem.posed, lever.name)
     if not lever.step:
@@ -330,36 +302,27 @@ def list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
     return lever.name, limit, step, lever.gained.show(lever.predicted, 3)
 
 
-def _write_sureness(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Blocks:
-    robust = analysis.boundaries if full else analysis.robustness
+def _write_sureness(solution: Solution, found: Explanation | None, brief: bool, full: bool) -> Parts:
+    robust = solution.analysis.boundaries if full else solution.analysis.robustness
     if robust is not None:
         yield Sentence(describe_robustness(robust, solution.stability.on_edge), "robustness")
         if full:
             yield tabulate_boundaries(robust)
-    if (found := analysis.explanation) is not None and found.precision:
+    if found is not None and found.precision:
         yield Sentence(describe_rounding(found), "rounding")
         if not brief:
             yield tabulate_rounding(found)
     if not brief:
-        yield from map(Sentence, bound_lines(solution))
-    if found is not None and not brief:
-        yield from explain_optimality(found.optimality)
+        yield from bound_lines(solution)
+        yield from write_optimality(found.optimality) if found else ()
 
 
-def _write_roots(solution: Solution, analysis: Analysis) -> Blocks:
-    if solution.multiple_as_rounded:
-        yield Sentence("roots coincide up to rounding errors; tmsopt prove tells it of the numbers as typed")
-    for diagnosis in analysis.diagnoses:
-        yield from explain_diagnosis(diagnosis, full=True)
-
-
-def _write_search(solution: Solution) -> Blocks:
+def _write_search(solution: Solution) -> Parts:
     free, starts, problem = solution.freedom, solution.starts, solution.problem
     if problem.locate:
-        parameters = "parameter" if free.free == 1 else "parameters"
-        conditions = "condition" if free.conditions == 1 else "conditions"
-        yield Sentence(f"{free.kind}, {free.free} free {parameters} and {free.conditions} {conditions}", "freedom")
-    yield from map(Sentence, list_branches(solution))
+        parameters, conditions = count_things(free.free, "free parameter"), count_things(free.conditions, "condition")
+        yield Sentence(f"{free.kind}, {parameters} and {conditions}", "freedom")
+    yield from list_branches(solution)
     if starts.tried:
         led = starts.tried - starts.runs
         also = f" ({led} skipped, because they lead to a known optimum)" if starts.runs and led else ""
@@ -368,13 +331,12 @@ def _write_search(solution: Solution) -> Blocks:
         yield Sentence(f"{tried}{sampled}; {solution.seconds:.2f} s", "starts")
 
 
-def list_branches(solution: Solution) -> list[str]:
+def list_branches(solution: Solution) -> Iterator[str]:
     """Other designs that solve the same equations, and what excludes them."""
-    problem, lines = solution.problem.posed, []
+    problem = solution.problem.posed
     for branch in solution.branches:
         where = ", ".join(f"{n} = {unit_of(problem, n).show(branch.parameters[n], ALL)}" for n in problem.free)
-        lines.append(f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}")
-    return lines
+        yield f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}"
 
 
 def _suggest_more(solution: Solution, analysis: Analysis) -> Sentence:
@@ -391,6 +353,3 @@ def _suggest_more(solution: Solution, analysis: Analysis) -> Sentence:
     return Sentence(
         f"--full prints everything; tmsopt {named} with the same file" if named else "--full", "more", "dim"
     )
-
-
-MAKERS: Mapping[str, Maker] = {"Solution": Maker(summarise_solution, write_solution, "draw_growth")}

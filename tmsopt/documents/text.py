@@ -4,7 +4,7 @@ import math
 import re
 import textwrap
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from tmsopt.documents.blocks import Block, Document, Figure, Listing, Sentence, TableBlock, Tone, Verbatim
 
@@ -21,6 +21,7 @@ _ASCII = str.maketrans(
 )
 
 Line = tuple[str, Tone]
+Columns = list[list[str]]
 
 
 def to_text(document: Document, width: int = WIDTH, colour: bool = False, ascii_only: bool = False) -> str:
@@ -30,8 +31,8 @@ def to_text(document: Document, width: int = WIDTH, colour: bool = False, ascii_
         colour: with escape codes that a terminal shows as colours.
         ascii_only: without letters that an encoding may not have.
     """
-    lines = [(line, tone) for line, tone in _lay_out(document, width, ascii_only)]
-    text = "\n".join(_colour(line.rstrip(), tone) if colour else line.rstrip() for line, tone in lines)
+    lines = ((line.rstrip(), tone) for line, tone in _lay_out(document, width, ascii_only))
+    text = "\n".join(_colour(line, tone) if colour else line for line, tone in lines)
     return re.sub(r"\n{3,}", "\n\n", text).strip("\n")
 
 
@@ -54,23 +55,24 @@ def _lay_out(document: Document, width: int, ascii_only: bool) -> Iterator[Line]
         if full and len(document.sections) > 1:
             yield from (("", ""), (section.title, "answer"), ("-" * len(section.title), ""))
         for block in shown:
-            yield from _lay_out_block(block, width, ascii_only, full)
+            tone = block.tone if isinstance(block, Sentence | TableBlock) else ""
+            yield from ((line, tone) for line in _lay_out_block(block, width, ascii_only, full))
         if not full:
             yield "", ""
 
 
-def _lay_out_block(block: Block, width: int, ascii_only: bool, full: bool) -> Iterator[Line]:
+def _lay_out_block(block: Block, width: int, ascii_only: bool, full: bool) -> Iterator[str]:
     match block:
-        case Sentence(text, label, tone):
-            said = f"{label}: {text}" if label else text
-            yield from ((line, tone) for line in wrap(_spell(said, ascii_only), width))
+        case Sentence(text, label):
+            yield from wrap(_spell(f"{label}: {text}" if label else text, ascii_only), width)
         case Listing(items, title):
-            yield from ((line, "") for line in wrap(_spell(title, ascii_only), width) if title)
-            yield from ((line, "") for line in _lay_out_list(items, width, ascii_only))
+            if title:
+                yield from wrap(_spell(title, ascii_only), width)
+            yield from _lay_out_list(items, width, ascii_only)
         case TableBlock():
-            yield from ((line, block.tone) for line in _lay_out_table(block, width, ascii_only, full))
+            yield from _lay_out_table(block, width, ascii_only, full)
         case Verbatim(text):
-            yield from ((_spell(line, ascii_only)[:width], "") for line in text.splitlines())
+            yield from (_spell(line, ascii_only)[:width] for line in text.splitlines())
 
 
 def wrap(text: str, width: int, first: str = "", rest: str = "  ") -> list[str]:
@@ -100,92 +102,77 @@ def _lay_out_list(items: Iterable[tuple[str, str]], width: int, ascii_only: bool
 
 
 def _lay_out_table(grid: TableBlock, width: int, ascii_only: bool, full: bool) -> Iterator[str]:
-    rows = [[_spell(cell, ascii_only) for cell in row] for row in grid.texts]
-    rows, left = (rows, 0) if full or grid.most is None else _thin(rows, grid.most, grid.keep)
-    used = [k for k in range(len(rows[0])) if any(row[k] for row in rows)]  # without empty columns
-    rows = [[row[k] for k in used] for row in rows]
-    head, *body = rows
+    head, *body = grid.texts
+    shown = range(len(body)) if full or grid.most is None else _choose_rows(len(body), grid.most, grid.keep)
+    cells = zip(head, *(body[k] for k in shown), strict=True)
+    columns = [[_spell(cell, ascii_only) for cell in column] for column in cells]
+    used = [k for k, column in enumerate(columns) if any(column)]  # without empty columns
     if not any(head):
-        yield from _align(_fold(body, grid.fold, width), width)
+        yield from _align(_fold([columns[k][1:] for k in used], grid.fold, width), width)
     elif full:
-        parts = list(_split_columns(rows, width))
-        for number, part in enumerate(parts):
+        for number, part in enumerate(_split_columns([columns[k] for k in used], width)):
+            yield from [""] * (number > 0)
             yield from _align(part, width)
-            yield from [""] * (number < len(parts) - 1)
     else:
-        needs = [grid.needs[k] if grid.needs else 0 for k in used]
-        kept = _choose_columns(rows, needs, width)
-        yield from _align([[row[k] for k in kept] for row in rows], width)
-        gone = [head[k] for k in range(len(head)) if k not in kept and head[k]]
+        kept = list(used)
+        while len(kept) > 1 and _measure_width([columns[k] for k in kept]) > width:
+            kept.remove(min(reversed(kept), key=lambda k: grid.needs[k] if grid.needs else 0))
+        yield from _align([columns[k] for k in kept], width)
+        left, gone = len(body) - len(shown), [columns[k][0] for k in used if k not in kept and head[k]]
         said = [f"{left} more row{'s' * (left > 1)}"] if left else []
         said += [f"more columns: {', '.join(gone)}"] if gone else []
-        yield from wrap(_spell(f"… {'; '.join(said)} ({grid.rest})", ascii_only), width, "  ", "    ") if said else ()
-        return
-    yield from [_spell(f"  … {left} more: {grid.rest}", ascii_only)] if left else ()
+        if said:
+            yield from wrap(_spell(f"… {'; '.join(said)} ({grid.rest})", ascii_only), width, "  ", "    ")
 
 
-def _thin(rows: list[list[str]], most: int, keep: Iterable[int]) -> tuple[list[list[str]], int]:
-    head, *body = rows
-    if len(body) <= most:
-        return rows, 0
-    kept, chosen = set(keep), list(range(most))
-    if kept:  # the others are spread evenly
-        room = most - len(kept)
-        chosen = sorted({*kept, *(round(k * (len(body) - 1) / max(room - 1, 1)) for k in range(room))})[:most]
-    return [head, *(body[k] for k in chosen)], len(body) - len(chosen)
+def _choose_rows(count: int, most: int, keep: Collection[int]) -> Sequence[int]:
+    """The first rows; where some are to stay, the others are spread evenly."""
+    if count <= most or not keep:
+        return range(min(count, most))
+    room = most - len(keep)
+    return sorted({*keep, *(round(k * (count - 1) / max(room - 1, 1)) for k in range(room))})[:most]
 
 
-def _choose_columns(rows: list[list[str]], needs: Sequence[int], width: int) -> list[int]:
-    """Columns that fit; the last one counts as narrow, for its words are wrapped."""
-    kept = list(range(len(rows[0])))
-    while len(kept) > 1 and _measure_width([[row[k] for k in kept] for row in rows]) > width:
-        kept.remove(min(reversed(kept), key=lambda k: needs[k]))
-    return kept
+def _measure_width(columns: Columns) -> int:
+    """The last column counts as narrow where its words can be wrapped."""
+    *first, last = (max(map(len, column)) for column in columns)
+    if any(" " in cell for cell in columns[-1]):
+        last = min(last, max(_NARROW, *(len(word) for cell in columns[-1] for word in cell.split())))
+    return sum(first) + 2 * len(columns) + last
 
 
-def _measure_width(rows: list[list[str]]) -> int:
-    columns = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    words = any(" " in row[-1] for row in rows)
-    last = (
-        min(columns[-1], max(_NARROW, *(len(w) for row in rows for w in row[-1].split()), 0)) if words else columns[-1]
-    )
-    return sum(columns[:-1]) + 2 * len(columns) + last
-
-
-def _split_columns(rows: list[list[str]], width: int) -> Iterator[list[list[str]]]:
+def _split_columns(columns: Columns, width: int) -> Iterator[Columns]:
     """The table as it is where it fits; else in parts below each other, each with the first column."""
-    start = 1
-    while True:
-        end = start + 1
-        while end < len(rows[0]) and _measure_width([[row[0], *row[start : end + 1]] for row in rows]) <= width:
-            end += 1
-        yield [[row[0], *row[start:end]] for row in rows] if len(rows[0]) > 1 else rows
-        if end >= len(rows[0]):
-            return
-        start = end
+    first, *others = columns
+    part = [first]
+    for column in others:
+        if len(part) > 1 and _measure_width([*part, column]) > width:
+            yield part
+            part = [first]
+        part.append(column)
+    yield part
 
 
-def _fold(rows: list[list[str]], fold: int, width: int) -> list[list[str]]:
+def _fold(columns: Columns, fold: int, width: int) -> Columns:
     """Rows side by side, down the first column first, where they are many and there is room."""
-    if not fold or len(rows) <= fold:
-        return rows
-    room = (width - 2) // (sum(max(map(len, column)) + 2 for column in zip(*rows, strict=True)) + 2) or 1
-    height = math.ceil(len(rows) / min(room, math.ceil(len(rows) / fold)))
-    blank = [""] * len(rows[0])
-    blocks = [rows[k : k + height] for k in range(0, len(rows), height)]
-    return [[cell for b in blocks for cell in (b[k] if k < len(b) else blank)] for k in range(height)]
+    count = len(columns[0])
+    if not fold or count <= fold:
+        return columns
+    room = (width - 2) // (sum(max(map(len, column)) + 2 for column in columns) + 2) or 1
+    height = math.ceil(count / min(room, math.ceil(count / fold)))
+    padded = [column + [""] * height for column in columns]
+    return [column[k : k + height] for k in range(0, count, height) for column in padded]
 
 
-def _align(rows: list[list[str]], width: int) -> Iterator[str]:
+def _align(columns: Columns, width: int) -> Iterator[str]:
     """Columns as wide as their widest cells; the last one is wrapped."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    indent = 2 + sum(w + 2 for w in widths[:-1])
-    for row in rows:
-        before = "  " + "".join(f"{cell:{w}}  " for cell, w in zip(row[:-1], widths, strict=False))
-        if len(before) + len(row[-1]) <= width or " " not in row[-1]:
-            yield before + row[-1]
+    widths = [max(map(len, column)) for column in columns[:-1]]
+    for *first, last in zip(*columns, strict=True):
+        before = "  " + "".join(f"{cell:{w}}  " for cell, w in zip(first, widths, strict=True))
+        if len(before) + len(last) <= width or " " not in last:
+            yield before + last
         else:
-            yield from wrap(row[-1], width, before, " " * indent)
+            yield from wrap(last, width, before, " " * len(before))
 
 
 def _spell(text: str, ascii_only: bool) -> str:

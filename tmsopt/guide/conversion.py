@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.guide.problem_text import toml_problem
@@ -77,15 +78,19 @@ def convert(
     problem = pose(given)
     if faults := [*_not_taken(problem, to, inertia)]:
         raise InputError(faults)
-    sizes = _sizes(problem, {"B": body, "H": front}) if inertia == "boxes" else {}
-    faults = [*_without_counterpart(problem), *_varied_masses(problem, sizes)]
+    sizes, faults = _sizes(problem, inertia, body, front), [*_without_counterpart(problem)]
+    for which in sizes:
+        if f"m_{which}" in problem.scenarios:
+            message = "varies, and the inertia of a box would vary with it; give it one value, or --inertia none"
+            faults.append(Fault(message, ("scenarios", f"m_{which}")))
     if faults:
         raise InputError(faults)
-    fixed, free, limits = dict(problem.fixed), dict(problem.free), dict(problem.constraints)
-    limits = {name: _translate(problem, text) for name, text in limits.items()}
-    for which, size in sizes.items():
-        for axes, share in _per_mass(size).items():
-            name, mass = f"I_{which}{axes}", f"m_{which}"
+    fixed, free = dict(problem.fixed), dict(problem.free)
+    limits = {name: _translate(problem, text) for name, text in problem.constraints.items()}
+    for which, (length, width, height) in sizes.items():
+        mass = f"m_{which}"
+        for axes, share in (("xx", (width**2 + height**2) / 12), ("zz", (length**2 + width**2) / 12)):  # m²
+            name = f"I_{which}{axes}"
             if mass in problem.free:
                 low, high = problem.free[mass]
                 free[name] = (_round(_INSIDE * share * low), _round(share * high / _INSIDE))
@@ -104,22 +109,15 @@ def convert(
     )
 
 
-def converted_file(
-    given: Given,
-    to: str = "whipple",
-    inertia: str = "boxes",
-    body: str | Size | None = None,
-    front: str | Size | None = None,
-) -> str:
-    """The text of a converted problem file, with what was assumed in comments; arguments as of `convert`."""
+def converted_file(given: Given, **options: Any) -> str:
+    """The text of a converted problem file, with what was assumed in comments; options as of `convert`."""
     problem = pose(given)
-    converted = convert(problem, to, inertia, body, front)
+    converted, sizes = convert(problem, **options), _sizes(problem, **options)
     lines = ["The two masses of the model tms in the model whipple, without wheels and trail."]
-    for which, size in _sizes(problem, {"B": body, "H": front}).items() if inertia == "boxes" else ():
-        name = {"B": "rear frame", "H": "front assembly"}[which]
+    for name, size in zip(("rear frame", "front assembly"), sizes.values(), strict=False):
         shown = " x ".join(f"{100 * x:.4g}" for x in size)
         lines.append(f"The {name} is a solid box of {shown} cm (length, width, height) about its centre of mass.")
-    if inertia == "boxes":
+    if sizes:
         lines.append("I_xx = m (width^2 + height^2)/12, I_zz = m (length^2 + width^2)/12, in kg m^2, and I_xz = 0.")
     radius = 0.125 * _middle(problem, "w")
     lines += [
@@ -148,19 +146,12 @@ def _not_taken(problem: Posed, to: str, inertia: str) -> Iterator[Fault]:
 
 def _without_counterpart(problem: Posed) -> Iterator[Fault]:
     """Words of the objective and the constraints that Whipple's model does not have."""
-    asked = {("objective", sense): text for sense in ("minimize", "maximize") if (text := getattr(problem, sense))}
-    asked |= {("objective", "pareto"): " ".join(problem.pareto)}
+    objectives = {"minimize": problem.minimize, "maximize": problem.maximize, "pareto": " ".join(problem.pareto)}
+    asked = {("objective", sense): text or "" for sense, text in objectives.items()}
     asked |= {("constraints", name): text for name, text in problem.constraints.items()}
     for key, text in asked.items():
-        for name in sorted({word[0] for word in _WORD.finditer(text)} - set(_counterparts(problem))):
+        for name in sorted({*_WORD.findall(text)} - set(_counterparts(problem))):
             yield Fault(f"{name} has no counterpart in the model whipple", key)
-
-
-def _varied_masses(problem: Posed, sizes: Mapping[str, Size]) -> Iterator[Fault]:
-    for which in sizes:
-        if f"m_{which}" in problem.scenarios:
-            message = "varies, and the inertia of a box would vary with it; give it one value, or --inertia none"
-            yield Fault(message, ("scenarios", f"m_{which}"))
 
 
 _WORD = re.compile(r"\b[A-Za-z_]\w*")
@@ -169,8 +160,9 @@ _WORD = re.compile(r"\b[A-Za-z_]\w*")
 def _counterparts(problem: Posed) -> dict[str, str]:
     """Word of an expression → what to write for it."""
     of, other = problem.parameter_set, controlled(whipple, problem.parameter_set.names)
-    in_si = {*of.names, *(q.name for q in of.quantities)} & {*other.sets[0].names, *other.quantity_names(other.sets[0])}
-    return {**{name: name for name in in_si}, **_WORDS}
+    own = (*of.names, *(q.name for q in of.quantities))
+    theirs = {*other.sets[0].names, *other.quantity_names(other.sets[0])}
+    return {name: name for name in own if name in theirs} | _WORDS
 
 
 def _translate(problem: Posed, text: str) -> str:
@@ -185,10 +177,16 @@ def _objective(problem: Posed, text: str | None) -> str | None:
     return _translate(problem, text)
 
 
-def _sizes(problem: Posed, given: Mapping[str, str | Size | None]) -> dict[str, Size]:
-    """Body → length, width and height of its box."""
+def _sizes(
+    problem: Posed,
+    inertia: str = "boxes",
+    body: str | Size | None = None,
+    front: str | Size | None = None,
+    **_options: str,
+) -> dict[str, Size]:
+    """Body → length, width and height of its box; empty without boxes."""
     found, faults = {}, []
-    for which, size in given.items():
+    for which, option, size in (("B", "body", body), ("H", "front", front)) if inertia == "boxes" else ():
         if size is None:
             length, width, height = (share * _middle(problem, "w") for share in _PER_WHEELBASE[which])
             centre = f"z_{which}"
@@ -198,7 +196,7 @@ def _sizes(problem: Posed, given: Mapping[str, str | Size | None]) -> dict[str, 
             try:
                 found[which] = _size(size)
             except ValueError as error:
-                faults.append(Fault(str(error), ({"B": "body", "H": "front"}[which],)))
+                faults.append(Fault(str(error), (option,)))
     if faults:
         raise InputError(faults)
     return found
@@ -219,12 +217,6 @@ def _size(given: str | Size) -> Size:
     if not all(0 < x < float("inf") for x in (a, b, c)):
         raise ValueError(f"found {short(given)}; {accepted}, each more than 0")
     return a, b, c
-
-
-def _per_mass(size: Size) -> dict[str, float]:
-    """Axes → moment of inertia of a solid box per mass, in m²."""
-    length, width, height = size
-    return {"xx": (width**2 + height**2) / 12, "zz": (length**2 + width**2) / 12}
 
 
 def _middle(problem: Posed, name: str) -> float:

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from tmsopt.errors import Fault, InputError, input_error, short
+from tmsopt.errors import InputError, input_error, short
 from tmsopt.guide.description import Description, Word, Words
-from tmsopt.models import CONSTANTS, FUNCTIONS, MODELS, Model, Parameter, ParameterSet, Quantity, Range
+from tmsopt.models import CONSTANTS, FUNCTIONS, MODELS, Model, Parameter, ParameterSet, Range
 from tmsopt.models.built_in import controlled, gain_names
 from tmsopt.models.user_spectrum import pattern_of, patterns_of
 from tmsopt.problem import Band, Given, Posed, Problem, Solution, Unit, load, pose, unit_of
@@ -34,20 +35,23 @@ def describe(given: Given | Model) -> Description:
 
     More: docs/reference/quantities.md
     """
-    if isinstance(given, Model):
-        return _describe(given, None, {})
-    if isinstance(given, str) and given in MODELS:
-        return _describe(MODELS[given], None, {})
     if isinstance(given, Problem | Posed | Solution):
         posed = pose(given)
-        return _describe(posed.model, posed, {})
+        return _describe(posed.model, posed)
+    model = MODELS.get(given, given) if isinstance(given, str) else given
+    if isinstance(model, Model):
+        return _describe(model)
     if not isinstance(given, str | PathLike):
         accepted = f"the name of a model ({', '.join(MODELS)}), the path of a file, a Model, a Problem, or a Solution"
         raise input_error(f"found {short(given)}; accepted: {accepted}", "given")
     try:
         problem, typed = _read(given)
     except InputError as error:
-        raise _with_models(error, given) from None
+        if "." in str(given) or len(error.faults) != 1:
+            raise
+        (fault,) = error.faults  # of a word that is no file: it may be meant for a model
+        message = f"{fault.message}; models: {' '.join(MODELS)}"
+        raise InputError([replace(fault, message=message)]) from None
     return _describe(problem.model, problem.posed, typed)
 
 
@@ -62,40 +66,33 @@ def _read(path: str | PathLike[str]) -> tuple[Problem, Typed]:
     return load_study(path).problem, inner if isinstance(inner, dict) else {}
 
 
-def _with_models(error: InputError, given: str | PathLike[str]) -> InputError:
-    """For a word that is no file, the error names the models too."""
-    if "." in str(given) or len(error.faults) != 1:
-        return error
-    (fault,) = error.faults
-    return InputError([Fault(f"{fault.message}; models: {' '.join(MODELS)}", fault.key, fault.file, fault.line)])
-
-
-def _describe(model: Model, problem: Posed | None, typed: Typed) -> Description:
-    size = model.degree if model.carrier is None else model.degree // 2
+def _describe(model: Model, problem: Posed | None = None, typed: Typed = Table()) -> Description:
+    stated = typed.get("model")
+    stated = stated if isinstance(stated, dict) else model.statement or {}
     return Description(
         model=model.name,
         meaning=model.title,
-        degree=size,
+        degree=model.degree if model.carrier is None else model.degree // 2,
         title=problem.title if problem else "",
-        sets=tuple(_words(model, of, problem, typed) for of in ([problem.parameter_set] if problem else model.sets)),
+        sets=tuple(_words(model, of, problem, stated) for of in ([problem.parameter_set] if problem else model.sets)),
         feedback=() if problem else tuple(_gains(model)),
         patterns=Table({name: pattern_of(model, name).meaning for name in patterns_of(model)}),
         functions=(*FUNCTIONS, *CONSTANTS),
         omits=model.omits,
         conventions=model.conventions,
         sketch=model.sketch,
-        matrices=Table(dict(_matrices(model, typed))),
+        matrices=Table(dict(_matrices(stated))),
         asked=Table(_list_question(problem, typed) if problem else {}),
     )
 
 
-def _words(model: Model, of: ParameterSet, problem: Posed | None, typed: Typed) -> Words:
-    written = _model_table(typed).get("quantities", (model.statement or {}).get("quantities", {}))
+def _words(model: Model, of: ParameterSet, problem: Posed | None, stated: Typed) -> Words:
+    written = stated.get("quantities", {})
     quantities = [s for n, s in vocabulary(model, of).items() if n not in of.names]
     return Words(
         of.name,
         tuple(_parameter(p, problem, model.statement is not None) for p in of.parameters),
-        tuple(_quantity(q, written.get(q.name, "")) for q in quantities),
+        tuple(Word(q.name, q.unit, f"= {written[q.name]}" if q.name in written else q.meaning) for q in quantities),
     )
 
 
@@ -104,35 +101,22 @@ def _gains(model: Model) -> Iterator[Words]:
     if not gain_names(model.name):
         return
     for of, more in zip(model.sets, controlled(model, gain_names(model.name)).sets, strict=True):
-        added = [_parameter(p, None, False) for p in more.parameters if p not in of.parameters]
         known = {q.name for q in of.quantities}
-        yield Words(of.name, tuple(added), tuple(_quantity(q, "") for q in more.quantities if q.name not in known))
+        added = (_parameter(p) for p in more.parameters if p not in of.parameters)
+        quantities = (Word(q.name, q.unit, q.meaning) for q in more.quantities if q.name not in known)
+        yield Words(of.name, tuple(added), tuple(quantities))
 
 
-def _quantity(q: Parameter | Quantity, formula: str) -> Word:
-    return Word(q.name, q.unit, f"= {formula}" if formula else q.meaning)
-
-
-def _parameter(p: Parameter, problem: Posed | None, of_user: bool) -> Word:
-    meaning = "" if of_user else p.meaning  # only its name is known
-    return Word(p.name, p.unit, meaning, _limits(p), _describe_value(p, problem))
-
-
-def _limits(p: Parameter) -> str:
-    """The physical range in words, angles in degrees."""
-    if p.range == Range():
-        return ""
-    if p.unit != "rad":
-        return str(p.range)
-    return f"{Range(math.degrees(p.range.lower), math.degrees(p.range.upper), p.range.closed)} deg"
-
-
-def _describe_value(p: Parameter, problem: Posed | None) -> str:
-    """What a parameter is, or may be, in the unit in which it was typed."""
-    if problem is None:
-        return "" if p.default is None else f"{p.default:.12g} if left out"
-    unit, free = unit_of(problem, p.name), problem.free.get(p.name)
-    return " … ".join(_number(x, unit) for x in free) if free else _number(problem.fixed[p.name], unit)
+def _parameter(p: Parameter, problem: Posed | None = None, of_user: bool = False) -> Word:
+    """Its meaning, its physical range in words, angles in degrees, and what it is or may be, in the unit as typed."""
+    possible = "" if p.range == Range() else str(p.range)
+    if possible and p.unit == "rad":
+        possible = f"{Range(math.degrees(p.range.lower), math.degrees(p.range.upper), p.range.closed)} deg"
+    given = "" if p.default is None else f"{p.default:.12g} if left out"
+    if problem is not None:
+        values = problem.free.get(p.name) or (problem.fixed[p.name],)
+        given = " … ".join(_number(x, unit_of(problem, p.name)) for x in values)
+    return Word(p.name, p.unit, "" if of_user else p.meaning, possible, given)
 
 
 def _number(value: Any, unit: Unit) -> str:
@@ -140,26 +124,17 @@ def _number(value: Any, unit: Unit) -> str:
     return value if isinstance(value, str) else unit.show(value, 12)
 
 
-def _model_table(typed: Typed) -> Mapping[str, Any]:
-    """The table [model] of a file."""
-    model = typed.get("model")
-    return model if isinstance(model, dict) else {}
-
-
-def _matrices(model: Model, typed: Typed) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:
-    for name, rows in (_model_table(typed) or model.statement or {}).items():
+def _matrices(stated: Typed) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:
+    for name, rows in stated.items():
         if isinstance(rows, list) and name not in ("parameters", "shared"):
             listed = rows if all(isinstance(row, list) for row in rows) else [rows]
-            yield name, tuple(tuple(str(entry) for entry in row) for row in listed)
+            yield name, tuple(tuple(map(str, row)) for row in listed)
 
 
 def _list_question(problem: Posed, typed: Typed) -> dict[str, Table[str]]:
     """What a problem asks, section by section."""
-    if problem.pareto:
-        objective = {"pareto": ", ".join(problem.pareto)}
-    else:
-        senses = ("locate", "minimize", "maximize")
-        objective = {n: text for n in senses if (text := getattr(problem, n)) is not None}
+    senses = {n: getattr(problem, n) or "" for n in ("locate", "minimize", "maximize")}
+    objective = {"pareto": ", ".join(problem.pareto)} if problem.pareto else {n: t for n, t in senses.items() if t}
     found: dict[str, dict[str, str]] = {"objective": objective, "constraints": dict(problem.constraints)}
     for section in ("scenarios", "tolerances", "weights"):
         own = typed.get(section, {})
@@ -169,7 +144,8 @@ def _list_question(problem: Posed, typed: Typed) -> dict[str, Table[str]]:
 
 def _span(value: Any, unit: Unit) -> str:
     """A scenario, a tolerance or a weight."""
-    if isinstance(value, Band | dict):
-        low, high = (value["min"], value["max"]) if isinstance(value, dict) else (value.min, value.max)
-        return f"{_number(low, unit)} … {_number(high, unit)}"
-    return ", ".join(_number(v, unit) for v in value) if isinstance(value, list | tuple) else _number(value, unit)
+    if isinstance(value, Band):
+        value = {"min": value.min, "max": value.max}
+    if isinstance(value, dict):
+        return f"{_number(value['min'], unit)} … {_number(value['max'], unit)}"
+    return ", ".join(_number(v, unit) for v in (value if isinstance(value, list | tuple) else [value]))

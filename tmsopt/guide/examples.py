@@ -37,9 +37,7 @@ def new_problem(model: str = "tms") -> str:
 
 def examples() -> dict[str, str]:
     """The examples that come with tmsopt: name → title."""
-    return {
-        name: str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")) for name, path in _files().items()
-    }
+    return {name: str(tomllib.loads(example(name)).get("title", "")) for name in _files()}
 
 
 def example(name: str) -> str:
@@ -48,10 +46,10 @@ def example(name: str) -> str:
     Raises:
         InputError: for a name that is none.
     """
-    stem = name.removesuffix(".toml")
-    if stem not in _files():
-        raise input_error(f"found '{name}'; {suggest(stem, _files())}", "name")
-    return _files()[stem].read_text(encoding="utf-8")
+    stem, found = name.removesuffix(".toml"), _files()
+    if stem not in found:
+        raise input_error(f"found '{name}'; {suggest(stem, found)}", "name")
+    return found[stem].read_text(encoding="utf-8")
 
 
 def companions(text: str) -> dict[str, str]:
@@ -77,11 +75,8 @@ def _files() -> Mapping[str, Path]:
     """The files of the examples: those of a checkout, or those that were installed with the package."""
     above = Path(__file__).parents[2]
     checkout, beside = above / "problems", above / _INSTALLED
-    if (checkout / SCHEMA_FILE).is_file():
-        found = list(checkout.glob("*.toml"))
-    elif beside.is_dir():  # pip install --target
-        found = list(beside.glob("*.toml"))
-    else:
+    found = [*(checkout if (checkout / SCHEMA_FILE).is_file() else beside).glob("*.toml")]  # pip install --target
+    if not found:
         listed = metadata.files("tmsopt") or []
         found = [Path(str(f.locate())) for f in listed if str(f.parent).endswith(_INSTALLED) and f.suffix == ".toml"]
     return {path.stem: path for path in sorted(found)}

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from typing import Any
@@ -24,14 +24,13 @@ def toml_problem(problem: Posed, comments: Iterable[str] = ()) -> str:
     Args:
         comments: lines to begin with.
     """
-    gains = gain_names(problem.model.name)
-    rows = {p.name: _row(problem, p) for p in problem.parameter_set.parameters if _is_written(problem, p)}
-    tables = {
-        "parameters": {name: row for name, row in rows.items() if name not in gains},
-        "feedback": {name: row for name, row in rows.items() if name in gains},
-        "objective": dict(_objective(problem)),
-        "constraints": {name: toml_text(text) for name, text in problem.constraints.items()},
-    }
+    gains, senses = gain_names(problem.model.name), ("locate", "minimize", "maximize", "pareto")
+    tables: dict[str, dict[str, str]] = {"parameters": {}, "feedback": {}}
+    for p in problem.parameter_set.parameters:
+        if _is_written(problem, p):
+            tables["feedback" if p.name in gains else "parameters"][p.name] = _row(problem, p)
+    tables["objective"] = {sense: toml_text(text) for sense in senses if (text := getattr(problem, sense))}
+    tables["constraints"] = {name: toml_text(text) for name, text in problem.constraints.items()}
     for table in ("scenarios", "tolerances", "weights"):
         tables[table] = {name: _value(problem, name, value) for name, value in getattr(problem, table).items()}
     lines = ["#:schema ./tmsopt.schema.json", *(f"# {comment}" for comment in comments)]
@@ -72,31 +71,29 @@ def exact_value(value: float, written: str, own: str) -> str:
 
 def _is_written(problem: Posed, parameter: Parameter) -> bool:
     """Whether a parameter must be in the file: no default, nor the middle of a scenario."""
-    if parameter.name in problem.free:
-        return True
-    default, varied = parameter.default, problem.scenarios.get(parameter.name)
-    return problem.fixed[parameter.name] != (default if varied is None else middle_of(varied))
+    name, varied = parameter.name, problem.scenarios.get(parameter.name)
+    default = parameter.default if varied is None else middle_of(varied)
+    return name in problem.free or problem.fixed[name] != default
 
 
 def _row(problem: Posed, parameter: Parameter) -> str:
     name = parameter.name
     comment = f"# {parameter.meaning}" + ("" if name in problem.units else f", {parameter.unit}")
-    if name not in problem.free:
-        return f"{_number(problem, name, problem.fixed[name])}  {comment}"
-    ends = dict(zip(("min", "max"), problem.free[name], strict=True))
-    ends |= {"start": problem.start[name]} if name in problem.start else {}
-    return f"{_table(problem, name, ends)}  {comment}"
-
-
-def _table(problem: Posed, name: str, entries: Mapping[str, float]) -> str:
-    return f"{{ {', '.join(f'{end} = {_number(problem, name, x)}' for end, x in entries.items())} }}"
+    value: Any = problem.fixed.get(name)
+    if name in problem.free:
+        value = dict(zip(("min", "max"), problem.free[name], strict=True))
+        value |= {"start": problem.start[name]} if name in problem.start else {}
+    return f"{_value(problem, name, value)}  {comment}"
 
 
 def _value(problem: Posed, name: str, value: Any) -> str:
+    """A number, a list of numbers, or a table of them."""
     if isinstance(value, Band):
-        return f"{_table(problem, name, {'min': value.min, 'max': value.max})[:-2]}, points = {value.points} }}"
+        return f"{_value(problem, name, {'min': value.min, 'max': value.max})[:-2]}, points = {value.points} }}"
     if isinstance(value, tuple):
         return f"[{', '.join(_number(problem, name, x) for x in value)}]"
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{end} = {_number(problem, name, x)}' for end, x in value.items())} }}"
     return _number(problem, name, value)
 
 
@@ -107,11 +104,3 @@ def _number(problem: Posed, name: str, value: float) -> str:
     if typed and (text[0] != '"' or str(parse_exact_quantity(text[1:-1], kept)[2]) != typed):
         return toml_text(typed if kept in ("1", "rad") else f"{typed} {kept}")
     return text
-
-
-def _objective(problem: Posed) -> Iterator[tuple[str, str]]:
-    for sense in ("locate", "minimize", "maximize"):
-        if text := getattr(problem, sense):
-            yield sense, toml_text(text)
-    if problem.pareto:
-        yield "pareto", f"[{', '.join(map(toml_text, problem.pareto))}]"

@@ -86,20 +86,23 @@ def _shape(of: Any) -> tuple[Schema, dict[str, Schema]]:
 
 
 def _plain(node: Any) -> Any:
-    if isinstance(node, list):
-        return [_plain(inner) for inner in node]
-    if not isinstance(node, dict):
-        return node.replace("/_", "/") if isinstance(node, str) and node.startswith("#/$defs/") else node
-    left = {
-        k: _plain(v)
-        for k, v in node.items()
-        if not (k == "title" and isinstance(v, str)) and (k, v) != ("default", None)
-    }
+    match node:
+        case str():
+            return node.replace("#/$defs/_", "#/$defs/")
+        case list():
+            return [_plain(inner) for inner in node]
+        case dict():
+            titled = isinstance(node.get("title"), str)
+            left = {k: _plain(v) for k, v in node.items() if not (k == "title" and titled)}
+        case _:
+            return node
+    if left.get("default", "") is None:
+        del left["default"]
     if "anyOf" in left:
         kinds = [kind for kind in left.pop("anyOf") if kind != {"type": "null"}]
-        simple = [kind["type"] for kind in kinds if set(kind) == {"type"}]
-        if len(simple) == len(kinds):  # number takes in integer
-            names = [kind for kind in simple if kind != "integer" or "number" not in simple]
+        if all(set(kind) == {"type"} for kind in kinds):
+            names = [kind["type"] for kind in kinds]
+            names = [n for n in names if n != "integer" or "number" not in names]  # number takes in integer
             return left | {"type": names[0] if len(names) == 1 else names}
         left |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
     return left
@@ -107,15 +110,15 @@ def _plain(node: Any) -> Any:
 
 def _refine_problem(problem: Schema, defs: dict[str, Schema]) -> None:
     """What the shape leaves open: names of models, patterns and parameters, and what goes with what."""
-    keys = problem["properties"]
-    for shape in (defs["FreeParameter"], defs["Band"]):
+    keys, objective, band = problem["properties"], defs.pop("Objective"), defs.pop("Band")
+    for shape in (defs["FreeParameter"], band):
         for end in ("min", "max", "start"):
             shape["properties"].get(end, {})["pattern"] = _WITH_UNIT
-    defs["Band"]["properties"]["points"] |= {"minimum": 2, "maximum": 99}
-    defs["Objective"]["properties"]["locate"] |= {**_offer({"enum": list(pattern_names(4))}), "pattern": _PATTERN}
-    defs["Objective"]["properties"]["pareto"] |= {"minItems": 2, "maxItems": 3, "uniqueItems": True}
-    defs["Objective"]["not"] = {"required": ["minimize", "maximize"]}
-    keys["objective"] = {"description": defs["Objective"]["description"], **defs.pop("Objective")}
+    band["properties"]["points"] |= {"minimum": 2, "maximum": 99}
+    objective["properties"]["locate"] |= {**_offer({"enum": list(pattern_names(4))}), "pattern": _PATTERN}
+    objective["properties"]["pareto"] |= {"minItems": 2, "maxItems": 3, "uniqueItems": True}
+    objective["not"] = {"required": ["minimize", "maximize"]}
+    keys["objective"] = {"description": objective["description"], **objective}
     keys["constraints"]["additionalProperties"] = {"type": "string", "pattern": _COMPARISON}
     titles = "; ".join(f"{model.name}: {model.title}" for model in MODELS.values())
     keys["model"] = {
@@ -126,13 +129,11 @@ def _refine_problem(problem: Schema, defs: dict[str, Schema]) -> None:
         "then": {"enum": list(MODELS)},
         "else": _model_table(),
     }
-    tables = [*(_ref(f"parameters_{name}") for name in MODELS), _ref("parameters_own")]
-    described = keys["parameters"]["description"]
-    keys["parameters"] = {"description": described, "type": "object", **_offer(*tables)}
-    gains = map(_ref, (f"feedback_{name}" for name in MODELS))
-    keys["feedback"] = {"description": keys["feedback"]["description"], "type": "object", **_offer(*gains)}
+    for table, own in (("parameters", ["own"]), ("feedback", [])):
+        offered = _offer(*(_ref(f"{table}_{name}") for name in (*MODELS, *own)))
+        keys[table] = {"description": keys[table]["description"], "type": "object", **offered}
     _, listed = keys["scenarios"]["additionalProperties"]["anyOf"]
-    keys["scenarios"]["additionalProperties"] = _either(defs.pop("Band"), listed)
+    keys["scenarios"]["additionalProperties"] = _either(band, listed)
     del problem["required"]  # of parameters, which a measured bicycle has in its own file
     problem["if"] = {"required": ["bicycle"]}
     problem["then"] = _with_names("whipple")
@@ -182,29 +183,22 @@ def _only(names: Iterable[str]) -> Schema:
 
 def _parameter(p: Parameter) -> Schema:
     """A number, a text with a unit, or a table that frees it: each keyword is for the one that it fits."""
-    unit = "" if p.unit == "1" else f", in {p.unit} or a text with a unit"
+    limits = ("minimum", "maximum") if p.range.closed else ("exclusiveMinimum", "exclusiveMaximum")
+    ends = zip(limits, (p.range.lower, p.range.upper), strict=True)
+    kinds, unit, pattern = ["number"], "", {}
+    if p.unit != "1":
+        kinds, unit, pattern = ["number", "string"], f", in {p.unit} or a text with a unit", {"pattern": _WITH_UNIT}
+    value: Schema = {"type": kinds, **{key: end for key, end in ends if math.isfinite(end)}, **pattern}
     left_out = "" if p.default is None else f" {p.default:g} if left out."
-    value = _value(p)
     free = {
         "properties": {end: {"description": f"The {what}.", **value} for end, what in _ENDS.items()},
         "required": ["min", "max"],
         "additionalProperties": False,
     }
-    return {"description": f"{p.meaning}{unit}.{left_out}", **value, "type": [*value["type"], "object"], **free}
+    return {"description": f"{p.meaning}{unit}.{left_out}", **value, "type": [*kinds, "object"], **free}
 
 
 _ENDS = {"min": "least value", "max": "greatest value", "start": "value to start the search from, among others"}
-
-
-def _value(p: Parameter) -> Schema:
-    least, greatest = ("minimum", "maximum") if p.range.closed else ("exclusiveMinimum", "exclusiveMaximum")
-    ends = {least: p.range.lower, greatest: p.range.upper}
-    limits: Schema = {key: end for key, end in ends.items() if math.isfinite(end)}
-    return (
-        {"type": ["number"], **limits}
-        if p.unit == "1"
-        else {"type": ["number", "string"], **limits, "pattern": _WITH_UNIT}
-    )
 
 
 def _own(free: Schema) -> Schema:
