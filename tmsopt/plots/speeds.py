@@ -27,14 +27,13 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
 
     More: docs/explanation/weave_and_capsize.md
     """
-    own, problem = ax is None, data.problem
+    problem = data.problem
     ax = on_axes(ax, 6.4, 2.4, problem.title)
     scale, words = scale_over(problem.posed, problem.posed.parameter_set[data.parameter]), events_of(problem.model)
     at = data.parameters.get(data.parameter, data.lower)
     last = _MARGIN * max(c.at for c in data.found) if data.found else data.lower + 2 * abs(at) + 1
     high = data.upper if math.isfinite(data.upper) else max(last, _MARGIN * at)
-    stable, damped = (np.minimum(bands, high) for bands in (data.stable, data.heavily_damped))
-    draw_bands(ax, scale.to_axis(stable), scale.to_axis(damped), (1, 1), 0.25)
+    draw_bands(ax, *(scale.to_axis(np.minimum(bands, high)) for bands in (data.stable, data.heavily_damped)))
     for k, event in enumerate(data.found):
         x, height = float(scale.to_axis(event.at)), 0.95 - 0.62 * (k % _LEVELS) / _LEVELS
         colour, _ = EVENTS.get(event.kind, (REAL, ""))
@@ -43,9 +42,7 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
         note(ax, f"{words.get(event.kind, event.kind)} {x:.4g}", (x, height), (side, 0), verticalalignment="top")
     if data.parameter in data.parameters:
         label = f"design at {scale.unit.show(at, 4)}"
-        ax.plot(
-            [scale.to_axis(at)], [0.06], "^", color=LINE, markersize=7, label=label, linestyle="none", clip_on=False
-        )
+        ax.plot(scale.to_axis(at), 0.06, "^", color=LINE, label=label, clip_on=False)
     ax.set(xlim=scale.to_axis([data.lower, high]), ylim=(0, 1.05), yticks=[], xlabel=scale.label)
     ax.spines[["left", "right", "top"]].set_visible(False)
-    return finish_axes(ax, own)
+    return finish_axes(ax)

@@ -44,17 +44,16 @@ def draw_trace(data: Trace, ax: Axes | None = None, horizontal: str | None = Non
     """
     plane = plane_over(data.problem.posed, horizontal, vertical, *data.varying, *data.problem.free)
     model = data.problem.model
-    drawn = on_axes(ax, 6.4, 5.0, data.problem.title or in_words_of(model, data.pattern))
-    _bands(drawn, data, plane)
+    ax = on_axes(ax, 6.4, 5.0, data.problem.title or in_words_of(model, data.pattern))
+    _bands(ax, data, plane)
     for branch in data.branches:
-        draw_branch(drawn, branch, plane, width=1.2, tint=LINE, model=model)
-    names = [
-        Name(in_words_of(model, e.name), *plane.to_axis(e.parameters)) for e in data.events if e.name not in _UNLABELLED
-    ]
+        draw_branch(ax, branch, plane, width=1.2, tint=LINE, model=model)
+    events = [e for e in data.events if e.name not in _UNLABELLED]
+    names = [Name(in_words_of(model, e.name), *plane.to_axis(e.parameters)) for e in events]
     for name in names:
-        drawn.plot(name.x, name.y, "o", color=MARK, markeredgecolor="white", markersize=5, zorder=4)
-    plane.label(drawn)
-    return finish_axes(drawn, ax is None, names)
+        ax.plot(name.x, name.y, "o", color=MARK, markeredgecolor="white", zorder=4)
+    plane.label(ax)
+    return finish_axes(ax, names)
 
 
 def draw_branch(
@@ -66,21 +65,20 @@ def draw_branch(
         model: in whose words.
     """
     points = plane.to_axis(branch.parameters)
-    states = list(zip(kinds_along(branch), branch.stable.tolist(), branch.satisfied.tolist(), strict=True))
-    events = {e.index for e in branch.events}
-    start, said = 0, {True: (), False: ("constraint violated",)}
+    states = zip(kinds_along(branch), branch.stable, branch.satisfied, strict=True)
+    events, start = {e.index for e in branch.events}, 0
     for (kind, stable, satisfied), run in groupby(states):
         stop = start + len(list(run))
         first = start - (start - 1 in events)
         end = stop + (stop - 1 not in events)  # no gap: an event belongs to both of its sides
-        label = ", ".join([in_words_of(model, kind), *["unstable"] * (not stable), *said[satisfied]])
+        words = in_words_of(model, kind), *["unstable"] * (not stable), *["constraint violated"] * (not satisfied)
         ax.plot(
             *points[:, first:end],
             "--" if kind.startswith("CEP") else "-" if satisfied else ":",
             color=tint or colour(kind),
             linewidth=width if satisfied else width / 2,
             alpha=1.0 if stable else 0.35,
-            label=None if label in ax.get_legend_handles_labels()[1] else label,
+            label=", ".join(words),
         )
         start = stop
 

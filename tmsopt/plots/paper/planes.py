@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tmsopt.paper.planes import OFF_LAW_CHI_B, OFF_LAW_TILT, Plane, chi_B_plane, tilt_plane
-from tmsopt.plots.chart import Legend, class_handles, domain_curves, fill_classes, frame, plane_of
-from tmsopt.plots.labels import Name, place_all, place_names
+from tmsopt.plots.chart import Legend, domain_curves, fill, fill_classes, grid_of, plane_of
+from tmsopt.plots.labels import Name, place_all
 from tmsopt.plots.style import COMPLEX, HEAVY, MARK, REAL, STABLE, entry, legend_below, new_figure
 from tmsopt.plots.trace import draw_branch
 
@@ -24,9 +23,6 @@ _LAWS = {
 _LEAST, _GREATEST = -1.9, 0.1  # of the abscissa in colours
 
 _ON_LAW = (r"(a) $\chi_B = \sqrt{2}$", r"(b) $\lambda_s = \lambda_s^{\mathrm{EP}_4} = 0.4107$ rad")
-
-_EP_SET_HANDLES = [entry("2EP2", REAL, linewidth=2), entry("CEP2", COMPLEX, "--", linewidth=2)]
-"""Legend entries of the EP set."""
 
 
 def ep_set_figure() -> Figure:
@@ -45,38 +41,35 @@ def off_law_figure() -> Figure:
 
 def abscissa_figure() -> Figure:
     """The abscissa over both planes, one colour scale for them."""
-    figure, points = new_figure(10.4, 4.4), (480, 360)
-    panels = figure.subplots(1, 2)
+    figure = new_figure(10.4, 4.4)
+    panels, named = figure.subplots(1, 2), []
     for ax, make, title in zip(panels, (tilt_plane, chi_B_plane), _ON_LAW, strict=True):
-        plane = make(0, points, False)
-        grid, abscissa = plane.chart.grid, plane.chart.abscissa
-        values = np.clip(abscissa, _LEAST, _GREATEST)
-        mesh = ax.pcolormesh(*grid, values, cmap="cividis", vmin=_LEAST, vmax=_GREATEST, rasterized=True)
+        plane = make(points=(480, 360), boundaries=False)
+        chart, axes = plane.chart, plane_of(plane.chart)
+        mesh = fill(ax, chart, axes, "abscissa", cmap="cividis", vmin=_LEAST, vmax=_GREATEST)
         levels = np.arange(-1.75, 0.01, 0.25)
-        ax.contour(*grid, abscissa, levels=levels, colors="white", linewidths=0.5, linestyles="-")
+        ax.contour(*grid_of(chart, axes), chart.abscissa, levels, colors="white", linewidths=0.5, linestyles="-")
         for law, (x, y) in plane.laws.items():
             words, colour, style = _LAWS[law]
-            ax.plot(x, y, style, color=colour, linewidth=1.5, label=words)
-        names = _draw_marked(ax, plane)
-        ax.legend(fontsize=7.5, facecolor="0.25", framealpha=0.85, loc="upper left", labelcolor="white")
-        frame(ax, plane.chart, plane_of(plane.chart))
-        place_names(ax, names)
-        ax.set_title(title, fontsize=10)
+            ax.plot(x, y, style, color=colour, label=words)
+        named.append((ax, _draw_marked(ax, plane)))
+        ax.legend(facecolor="0.25", loc="upper left", labelcolor="white")
+        ax.set_title(title)
     figure.colorbar(mesh, ax=panels.tolist(), label="spectral abscissa", extend="max")
+    place_all(named)
     return figure
 
 
 def draw_plane(ax: Axes, plane: Plane) -> Legend:
     """Classes, exact boundaries with corners, the EP set and the marked points of a plane; names, legend entries."""
     chart, axes = plane.chart, plane_of(plane.chart)
-    fill_classes(ax, chart, axes)
-    names, handles = domain_curves(ax, chart.domain, axes)
-    handles = [*class_handles(chart.kind, chart.problem.model), *handles]
+    handles = fill_classes(ax, chart, axes)
+    names, curves = domain_curves(ax, chart.domain, axes)
+    handles += curves
     if plane.ep_set is not None:
-        handles += _EP_SET_HANDLES
+        handles += [entry("2EP2", REAL, linewidth=2), entry("CEP2", COMPLEX, "--", linewidth=2)]
         for branch in plane.ep_set.branches:
             draw_branch(ax, branch, axes, width=2.0)
-    frame(ax, chart, axes)
     return names + _draw_marked(ax, plane), handles
 
 
@@ -89,19 +82,15 @@ def _planes_figure(planes: Sequence[Plane], titles: Sequence[str]) -> Figure:
 
 def draw_planes(figure: Figure, panels: Sequence[Axes], planes: Sequence[Plane], titles: Sequence[str]) -> None:
     """Planes with their titles, one legend for all, and their names."""
-    found: list[tuple[Axes, list[Name]]] = []
-    entries: list[Artist] = []
-    for ax, plane, title in zip(panels, planes, titles, strict=True):
-        names, handles = draw_plane(ax, plane)
-        ax.set_title(title, fontsize=10)
-        found.append((ax, names))
-        entries += handles
-    legend_below(figure, entries)
-    place_all(found)
+    drawn = [draw_plane(ax, plane) for ax, plane in zip(panels, planes, strict=True)]
+    for ax, title in zip(panels, titles, strict=True):
+        ax.set_title(title)
+    legend_below(figure, [entry for _, entries in drawn for entry in entries])
+    place_all([(ax, names) for ax, (names, _) in zip(panels, drawn, strict=True)])
 
 
 def _draw_marked(ax: Axes, plane: Plane) -> list[Name]:
-    for x, y in plane.marked.values():
-        ax.plot(x, y, "o", color=MARK, markeredgecolor="white", markersize=6, zorder=6)
+    for place in plane.marked.values():
+        ax.plot(*place, "o", color=MARK, markeredgecolor="white", zorder=6)
     words = {"least Fr_c": r"least $\mathrm{Fr}_c$"}
-    return [Name(words.get(name, name), x, y) for name, (x, y) in plane.marked.items()]
+    return [Name(words.get(name, name), *place) for name, place in plane.marked.items()]
