@@ -2,7 +2,7 @@
 
 import math
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any
@@ -117,8 +117,8 @@ class Survey:
 
     def compute(self, rows: range) -> tuple[dict[str, NDArray[Any]], Tally]:
         """The layers of a few rows, shape (len(rows), n), and their counts."""
-        model, shape = self.problem.model, (len(rows), self.grid.shape[-1])
-        columns, fallbacks, layers = {**self.problem.fixed, **self.grid.columns(rows)}, 0, self.dtypes.keys()
+        shape, layers, fallbacks = (len(rows), self.grid.shape[-1]), self.dtypes.keys(), 0
+        columns, model = {**self.problem.fixed, **self.grid.columns(rows)}, self.problem.model
         with np.errstate(all="ignore"):  # overflow counts as undefined
             values = self.before(columns)
             coefficients = [np.broadcast_to(values[n], shape) for n in model.coefficient_names()]
@@ -167,37 +167,36 @@ def plan_survey(
     names = axes_of(problem, axes)
     sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
     extra = {} if quantities is None else quantities
-    faults = layer_faults(layers, tuple(LAYERS))
-    faults += table_faults("quantities", extra, "{'wheel_load': 'load_front/2'}")
+    faults = layer_faults(layers, LAYERS) + table_faults("quantities", extra, "{'wheel_load': 'load_front/2'}")
     if not faults:
         reserved = {*LAYERS, *names, "about"}
         message = f"accepted: letters, digits and _, other than {' '.join(sorted(reserved))}"
         wrong = [n for n in extra if n in reserved or not (n.isidentifier() and n.isascii())]
-        faults += [Fault(f"found the name {n!r}; {message}", ("quantities",)) for n in wrong]
+        faults = [Fault(f"found the name {n!r}; {message}", ("quantities",)) for n in wrong]
         if not (layers or extra):
             faults.append(Fault(f"found none; accepted: some of {' '.join(LAYERS)}", ("layers",)))
     if faults:
         raise InputError(faults)
     wanted = {_QUANTITY + n: e for n, e in parse_all(problem, extra).items()}
-    if with_radius := [n for n in extra if RADIUS in wanted[_QUANTITY + n].names]:
-        message = f"found {RADIUS}, which needs a search for every design; accepted: quantities with a formula"
-        raise InputError([Fault(message, ("quantities", n)) for n in with_radius])
+    message = f"found {RADIUS}, which needs a search for every design; accepted: quantities with a formula"
+    if faults := [Fault(message, ("quantities", n)) for n in extra if RADIUS in wanted[_QUANTITY + n].names]:
+        raise InputError(faults)
     if {"satisfied", "margin"} & set(layers):
         wanted |= {_LIMIT + n: c for n, c in limits_of(problem).items()}
     wanted |= parse_all(problem, {n: n for n in problem.model.coefficient_names()})
     on_roots = {n: e for n, e in wanted.items() if set(ROOT_NAMES) & set(e.names)}
-    dtypes = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *extra)}
+    types = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *extra)}
     return Survey(
         problem,
         Grid(names, tuple(np.linspace(*problem.free[n], m) for n, m in zip(names, sizes, strict=True))),
-        {n: np.dtype(np.float32) if single and d == np.float64 else d for n, d in dtypes.items()},
+        {n: np.dtype(np.float32) if single and d == np.float64 else d for n, d in types.items()},
         dict(extra),
         before=array_function(problem, {n: e for n, e in wanted.items() if n not in on_roots}),
         after=array_function(problem, on_roots),
     )
 
 
-def layer_faults(names: Any, accepted: Sequence[str]) -> list[Fault]:
+def layer_faults(names: Any, accepted: Collection[str]) -> list[Fault]:
     """Faults in a list of layers."""
     return list_faults("layers", names, "['kind', 'abscissa']") or [
         Fault(f"found {short(n)}; {suggest(n, accepted)}", ("layers",)) for n in names if n not in accepted

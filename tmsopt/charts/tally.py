@@ -42,10 +42,10 @@ def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 
     kind, satisfied, abscissa = (layers.get(n) for n in ("kind", "satisfied", "abscissa"))
     least, place = math.nan, -1
     if abscissa is not None:
-        allowed = np.where(True if satisfied is None else satisfied, abscissa, np.nan)
-        best = np.fmin.reduce(allowed, axis=None)
-        if np.isfinite(best):
-            least, place = float(best), first + int(np.argmax(allowed == best))
+        allowed = np.where(np.isfinite(abscissa) & (True if satisfied is None else satisfied), abscissa, np.inf)
+        best = int(allowed.argmin())
+        if allowed.flat[best] < np.inf:
+            least, place = float(allowed.flat[best]), first + best
     return Tally(
         next(iter(layers.values())).size,
         () if kind is None else tuple(np.bincount(kind.ravel(), minlength=len(CLASSES)).tolist()),
@@ -58,14 +58,14 @@ def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 
 
 def add_tallies(tallies: Iterable[Tally]) -> Tally:
     """Add the counts of several tiles, in any order."""
-    every = list(tallies)
-    least, place = min(((t.least, t.place) for t in every if t.place >= 0), default=(math.nan, -1))
+    every = [*tallies]
+    best = min((t for t in every if t.place >= 0), key=lambda t: (t.least, t.place), default=Tally())
     satisfied = [t.satisfied for t in every if t.satisfied is not None]
     return Tally(
         sum(t.designs for t in every),
         tuple(map(sum, zip(*(t.classes for t in every), strict=True))),
         sum(satisfied) if satisfied else None,
-        least,
-        place,
+        best.least,
+        best.place,
         sum(t.fallbacks for t in every),
     )
