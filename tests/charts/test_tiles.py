@@ -10,7 +10,7 @@ from helpers.charts import EXTRA, FIXED, PLANE, POINTS, SPACE, charted, files
 from tmsopt.charts import LAYERS, Grid, add_tallies, chart, count_tile, open_chart, plan_survey
 from tmsopt.errors import InputError
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity
-from tmsopt.problem import Problem, array_function, load
+from tmsopt.problem import Problem, array_function
 from tmsopt.roots import CLASSES
 
 
@@ -181,11 +181,3 @@ def test_a_worker_that_crashes_ends_the_chart(tmp_path):
         charted(path, problem, points=(4, 6), tile=4, workers=2, quantities={"x": "fatal"})
     with pytest.raises(InputError, match="not finished"):
         open_chart(path)
-
-
-def test_one_or_four_free_parameters_make_no_grid():
-    for problem in (load("problems/chart.toml"), SPACE):
-        assert plan_survey(problem, points=(3,) * len(problem.free)).grid.size == 3 ** len(problem.free)
-    line = dataclasses.replace(PLANE, fixed=PLANE.fixed | {"Fr": 2.0}, free={"lambda_s": (0.1, 1.0)})
-    with pytest.raises(InputError, match="two or three free parameters, and 1 are free"):
-        plan_survey(line, points=(3,))

@@ -106,7 +106,7 @@ def test_a_name_stands_at_its_own_curve(whipple, part):
     """The leader of a name begins at a point of the curve; the frequency of a real root is none."""
     data = tmsopt.growth(whipple)
     ax = (plots.draw_growth if part == "growth" else plots.draw_frequencies)(data, ax_of())
-    curves = import_module("tmsopt.plots.growth")._curves
+    curves = import_module("tmsopt.plots.growth").draw_curves
     found = curves(ax_of(), data, "real" if part == "growth" else "imag")
     assert sorted(words(ax)) == sorted(n.text for n in found)
     assert {n.text for n in found} == ({"weave", "capsize", "castering"} if part == "growth" else {"weave"})

@@ -1,7 +1,6 @@
 """Stability charts drawn with their exact boundary curves."""
 
 from collections.abc import Iterable, Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -55,18 +54,24 @@ _LAYERS = {"damping_ratio": "damping ratio", "real_roots": "number of real roots
 """Words for layers of numbers; quantities have their own name."""
 
 
-def fill(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str, **look: Any) -> QuadMesh:
+def draw_layer(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> Legend:
+    """A layer as colours, exact boundaries on top, hatched where a constraint is violated; names and legend entries."""
+    model, handles = chart.problem.model, list[Artist]()
+    if layer == "kind":
+        handles += class_handles(chart.kind, model)
+        _fill(ax, chart, plane, layer, cmap=ListedColormap(CLASS_COLOURS), vmin=-0.5, vmax=len(CLASSES) - 0.5)
+    else:
+        _fill_numbers(ax, chart, plane, layer)
+    names, curves = domain_curves(ax, chart.domain, plane, model)
+    return names, [*handles, *curves, *_hatch_violations(ax, chart, plane)]
+
+
+def _fill(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str, **look: Any) -> QuadMesh:
     """A layer as colours, in a plane with its symbols and units, with limits at the ends of the grid."""
-    x, y = grid = grid_of(chart, plane)
+    x, y = grid = _grid(chart, plane)
     plane.label(ax)
     ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     return ax.pcolormesh(*grid, chart.layers[layer], rasterized=True, **look)
-
-
-def fill_classes(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Artist]:
-    """The class of every grid point as a colour; legend entries."""
-    fill(ax, chart, plane, "kind", cmap=ListedColormap(CLASS_COLOURS), vmin=-0.5, vmax=len(CLASSES) - 0.5)
-    return [*class_handles(chart.kind, chart.problem.model)]
 
 
 def class_handles(kind: NDArray[np.int8], model: Model) -> list[Patch]:
@@ -169,9 +174,7 @@ def draw_chart(
     if layer not in data.layers:
         raise input_error(f"found '{layer}'; {suggest(layer, data.layers)}", "layer")
     ax = on_axes(ax, 6.4, 5.4, data.problem.title)
-    handles = (fill_classes if layer == "kind" else partial(_fill_numbers, layer=layer))(ax, data, plane)
-    names, curves = domain_curves(ax, data.domain, plane, data.problem.model)
-    handles += [*curves, *_hatch_violations(ax, data, plane)]
+    names, handles = draw_layer(ax, data, plane, layer)
     if layer == "abscissa" and optimum:
         handles += _optimum(ax, data, plane)
     if design is not None:
@@ -194,7 +197,7 @@ def chart_figure(chart: Chart, layer: str = "kind", design: Solution | None = No
     return figure_of(draw_chart(chart, None, layer, design))
 
 
-def grid_of(chart: Chart, plane: PlaneAxes) -> list[Array]:
+def _grid(chart: Chart, plane: PlaneAxes) -> list[Array]:
     """Values along both axes, as they stand there."""
     return [scale.to_axis(values) for scale, values in zip(plane, chart.grid, strict=True)]
 
@@ -203,7 +206,7 @@ def _hatch_violations(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Artist]:
     """Hatching where a constraint does not hold, and a line where it just does; its legend entry."""
     if "satisfied" not in chart.layers or chart.satisfied.all():
         return []
-    grid = grid_of(chart, plane)
+    grid = _grid(chart, plane)
     hatched = ax.contourf(*grid, ~chart.satisfied, levels=[0.5, 1.5], colors="none", hatches=["//"])
     hatched.set(edgecolor=(0.4, 0.4, 0.4, 0.7), linewidth=0)
     if "margin" in chart.layers and np.any(chart.margin > 0) and np.any(chart.margin < 0):
@@ -211,8 +214,8 @@ def _hatch_violations(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Artist]:
     return [Patch(facecolor="none", edgecolor="0.4", hatch="//", linewidth=0, label="constraint violated")]
 
 
-def _fill_numbers(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> list[Artist]:
-    """The abscissa, damping ratio, number of real roots or a quantity, with its colour bar; no legend entries."""
+def _fill_numbers(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> None:
+    """The abscissa, damping ratio, number of real roots or a quantity, with its colour bar."""
     bar: dict[str, Any] = {"label": _LAYERS.get(layer, layer), "extend": "both"}
     values = np.ma.masked_invalid(np.asarray(chart.layers[layer], dtype=float))
     low, high = np.percentile(values.compressed(), _SHOWN) if values.count() else (0.0, 1.0)
@@ -225,15 +228,14 @@ def _fill_numbers(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> list[
         most = max(abs(low), abs(high)) or 1.0
         look = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
         bar["label"] = abscissa_label(chart.problem.posed)
-        grid = grid_of(chart, plane)
+        grid = _grid(chart, plane)
         levels = [x for x in MaxNLocator(9).tick_values(low, high) if low <= x <= high and x != 0]
         drawn = ax.contour(*grid, values, levels=levels, colors="0.15", linewidths=0.6)
         for text in ax.clabel(drawn, fontsize=6.5, fmt="%.3g"):
             text.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
         if chart.domain is None:
             ax.contour(*grid, values, levels=[0.0], colors=LINE, linewidths=1.6)
-    figure_of(ax).colorbar(fill(ax, chart, plane, layer, **look), ax=ax, **bar)
-    return []
+    figure_of(ax).colorbar(_fill(ax, chart, plane, layer, **look), ax=ax, **bar)
 
 
 def _optimum(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Line2D]:
@@ -250,7 +252,7 @@ def _optimum(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Line2D]:
         return []
     values = np.where(allowed, chart.abscissa, np.inf)
     row, column = np.unravel_index(values.argmin(), values.shape)
-    x, y = grid_of(chart, plane)
+    x, y = _grid(chart, plane)
     label = f"{'best Im ω' if of_H else 'least abscissa'} on the grid, {values[row, column]:.4g}"
     return _mark(ax, (x[column], y[row]), "*", label)
 

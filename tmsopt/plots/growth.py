@@ -53,10 +53,6 @@ _NOTHING = 1e-12  # of the range: less is 0 but for rounding
 
 _ROOM = 0.08  # of all that is shown of H, above and below it
 
-_ALONG = 0.7, 0.17  # of the width of a plot: where the first name stands, and how far left of it the next
-
-_INNER = 0.3, 0.9  # of a curve: between them, not at its ends
-
 _Curve = tuple[Mode, Array]
 """A mode, and its growth rates or frequencies as they stand on the axis."""
 
@@ -108,7 +104,7 @@ def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: f
     figure = new_figure(6.4, 6.8)
     upper, lower = figure.subplots(2, 1, sharex=True)
     data = growth(data) if isinstance(data, Solution) else data
-    named = [(ax, _curves(ax, data, part)) for ax, part in ((upper, "real"), (lower, "imag"))]
+    named = [(ax, draw_curves(ax, data, part)) for ax, part in ((upper, "real"), (lower, "imag"))]
     upper.set_xlabel("")
     if (unit := metres_per_second) is not None and data.over.name == "Fr":
         speed = upper.secondary_xaxis("top", functions=(lambda x: x * unit, lambda x: x / unit))
@@ -122,10 +118,10 @@ def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: f
 def _draw(data: Growth | Solution, ax: Axes | None, part: str) -> Axes:
     data = growth(data) if isinstance(data, Solution) else data
     ax = on_axes(ax, 6.4, 4.4, data.problem.title)
-    return finish_axes(ax, _curves(ax, data, part))
+    return finish_axes(ax, draw_curves(ax, data, part))
 
 
-def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
+def draw_curves(ax: Axes, data: Growth, part: str) -> list[Name]:
     """Everything but the legend; the names of the modes, to place."""
     scale, of_H = scale_over(data.problem.posed, data.over), _of_H(data)
     draw_bands(ax, scale.to_axis(data.stable), scale.to_axis(data.heavily_damped))
@@ -143,9 +139,12 @@ def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
         ylabel=OF_H[part] if of_H else _LABELS[part][data.rate is not None],
         xlabel=scale.label,
         xlim=scale.to_axis([first, data.values[-1]]),
-        ylim=_focus(data, curves, part),
     )
-    found = _names(ax, scale, curves, names)
+    if of_H:
+        ax.margins(y=_ROOM)
+    else:
+        ax.set_ylim(_focus(data, curves, part))
+    found = _names(ax, scale, curves)
     if of_H:
         kind = "EP{}" if "EP" in data.structure else "{}-fold"
         for root, (own, z) in zip(data.multiple, _multiple(data), strict=True):
@@ -190,13 +189,8 @@ def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
 
 
 def _focus(data: Growth, curves: Sequence[_Curve], part: str) -> tuple[float, float]:
-    """Limits that show the roots around the design and the events, even where others run away; of H all there is."""
+    """Limits that show the roots around the design and the events, even where others run away."""
     shown = [y for _, y in curves]
-    if _of_H(data):
-        every = np.concatenate([*shown, [0.0] if part == "real" else []])
-        bottom, top = every.min(), every.max()
-        room = _ROOM * (top - bottom or abs(top) or 1)
-        return bottom - room, top + room
     if part == "real":
         centres = [data.design, *(c.at for c in data.events if c.kind in ("weave", "capsize"))]
         room = 0.25 * abs(data.design) + 0.05 * (data.values[-1] - data.values[0])
@@ -207,23 +201,17 @@ def _focus(data: Growth, curves: Sequence[_Curve], part: str) -> tuple[float, fl
     return bottom - room * (part == "real"), top + room
 
 
-def _names(ax: Axes, scale: AxisScale, curves: Sequence[_Curve], names: Sequence[str]) -> list[Name]:
-    """Each mode's name where the longest of its curves is in sight, those of several modes spread out."""
-    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-    longest: dict[str, Array] = {}
-    for mode, y in curves:
-        x = scale.to_axis(mode.values)
-        piece = np.array([x, y])[:, (x > left) & (x < right) & (y > bottom) & (y < top)]
-        if piece.size and np.ptp(piece[0]) >= np.ptp(longest.get(mode.name, piece)[0]):
-            longest[mode.name] = piece
-    found = []
-    for k, name in enumerate(names):
-        if name in longest:
-            x, y = longest[name]
-            place = left + (_ALONG[0] - _ALONG[1] * k) * (right - left)
-            at = np.abs(x - np.clip(place, *np.quantile([x[0], x[-1]], _INNER))).argmin()
-            found.append(Name(name, float(x[at]), float(y[at])))
-    return found
+def _names(ax: Axes, scale: AxisScale, curves: Sequence[_Curve]) -> list[Name]:
+    """Each mode's name in the middle of the longest of its curves that is in sight."""
+    low, high = np.reshape([ax.get_xlim(), ax.get_ylim()], (2, 2, 1)).swapaxes(0, 1)
+    longest: dict[str, tuple[float, Name]] = {}
+    for mode, heights in curves:
+        points = np.array([scale.to_axis(mode.values), heights])
+        x, y = points[:, ((points > low) & (points < high)).all(axis=0)]
+        if x.size and np.ptp(x) >= longest.get(mode.name, (0.0, None))[0]:
+            middle = np.abs(x - (x[0] + x[-1]) / 2).argmin()
+            longest[mode.name] = np.ptp(x), Name(mode.name, float(x[middle]), float(y[middle]))
+    return [name for _, name in longest.values()]
 
 
 def _multiple(data: Growth) -> list[tuple[float, complex]]:

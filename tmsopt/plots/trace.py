@@ -25,7 +25,7 @@ COLOURS = {
 """Colour of each pattern; complex ones are dashed besides."""
 
 _UNLABELLED = ("fold", "constraint", "end")
-_BANDS = {True: 6.0, False: 2.5}
+_BANDS = 6.0, 2.5
 """Width of the coloured band along what is stable, and what is not."""
 
 
@@ -105,16 +105,15 @@ def trace_figure(trace: Trace, horizontal: str | None = None, vertical: str | No
 
 def _bands(ax: Axes, data: Trace, plane: PlaneAxes) -> None:
     """Segments coloured by the abscissa of their ends, with the colour bar."""
-    segments, values, widths = [], [], []
+    pieces = []
     for branch in data.branches:
-        points = plane.to_axis(branch.parameters).T
-        segments.append(np.stack([points[:-1], points[1:]], axis=1))
-        values.append((branch.abscissa[:-1] + branch.abscissa[1:]) / 2)
-        widths += [_BANDS[bool(s)] for s in branch.stable[:-1] & branch.stable[1:]]
-    if segments:
-        drawn = LineCollection(
-            [*np.concatenate(segments)], cmap="cividis", linewidths=widths, capstyle="projecting", zorder=1
-        )
-        drawn.set_array(np.concatenate(values))
+        points, stable = plane.to_axis(branch.parameters).T, branch.stable
+        middle = (branch.abscissa[:-1] + branch.abscissa[1:]) / 2
+        pieces.append((np.stack([points[:-1], points[1:]], axis=1), middle, stable[:-1] & stable[1:]))
+    if pieces:
+        segments, values, inner = (np.concatenate(column) for column in zip(*pieces, strict=True))
+        widths = np.where(inner, *_BANDS)
+        drawn = LineCollection([*segments], array=values, linewidths=widths, capstyle="projecting", zorder=1)
+        drawn.set_cmap("cividis")
         ax.add_collection(drawn)
         figure_of(ax).colorbar(drawn, ax=ax, label=abscissa_label(data.problem.posed))

@@ -10,8 +10,9 @@ from tmsopt.paper.experiment import SLACK, Experiment, experiment
 from tmsopt.paper.reference import benchmark, optimised_benchmark
 from tmsopt.paper.sketch import sketch
 from tmsopt.plots.bicycle import draw_bicycle, draw_distance
-from tmsopt.plots.labels import FROUDE
-from tmsopt.plots.style import COMPLEX, CRITICAL, EDGE, LINE, MARK, REAL, STABLE, draw_bands, new_figure, note
+from tmsopt.plots.growth import draw_curves
+from tmsopt.plots.labels import finish_axes
+from tmsopt.plots.style import COMPLEX, CRITICAL, EDGE, LINE, MARK, REAL, STABLE, new_figure, note
 from tmsopt.problem.problem import Problem
 from tmsopt.search.solve import solve
 
@@ -42,26 +43,16 @@ def growth_figure() -> Figure:
     others = {name: value for name, value in benchmark().parameters.items() if name != "Fr"}
     fastest = solve(Problem(tms, fixed=others, free={"Fr": (0.1, 4.0)}, minimize="abscissa"), interruptible=False)
     best = solve(Problem(tms, fixed=dict(optimised_benchmark().parameters)))
-    figure = new_figure(9.2, 4.2)
-    panels = figure.subplots(1, 2, sharey=True)
+    figure = new_figure(9.2, 4.4)
+    panels = figure.subplots(1, 2)
     for ax, design, name in zip(panels, (fastest, best), ("(a) benchmark", "(b) optimised benchmark"), strict=True):
-        data, at = growth(design, end=4.0), (design.dimensionless["Fr"], design.abscissa)
-        is_multiple = "EP" in data.structure
-        draw_bands(ax, data.stable, data.heavily_damped)
-        ax.plot(data.values, np.sort(data.roots.real, axis=1), color=LINE)
-        label = rf"$\mathrm{{Fr}}_c = {data.critical:.4g}$"
-        ax.axvline(data.critical, color=CRITICAL, linestyle="--", label=label)
-        symbol = rf"\mathrm{{Fr}}_{{\mathrm{{{data.structure}}}}}" if is_multiple else r"\mathrm{Fr}"
-        ax.axvline(at[0], color=MARK, linestyle=":", label=rf"${symbol} = {at[0]:.4g}$")
-        ax.axhline(0, color="grey", linewidth=0.6)
+        at = design.dimensionless["Fr"], design.abscissa
         ax.axhline(at[1], color="0.5", linewidth=0.8, linestyle=":")
-        ax.plot(*at, "o", color=REAL if is_multiple else "white", markeredgecolor="black")
-        if data.structure == "EP4":
-            note(ax, r"$\mathrm{EP}_4$", at, (9, 5), fontsize=10)
-        title = rf"{name}: least abscissa ${at[1]:.4g}$ at $\mathrm{{Fr}} = {at[0]:.4f}$"
-        ax.set(xlim=(0, 4), ylim=(-4, 4), xlabel=FROUDE, title=title)
-        ax.legend(loc="upper right")
-    panels[0].set_ylabel(r"growth rates $\mathrm{Re}\,s$")
+        names = draw_curves(ax, growth(design, end=4.0), "real")
+        ax.plot(*at, "o", color=MARK, zorder=5)
+        ax.set_ylim(-4, 4)
+        finish_axes(ax, names)
+        ax.set_title(rf"{name}: least abscissa ${at[1]:.4g}$ at $\mathrm{{Fr}} = {at[0]:.4f}$")
     return figure
 
 

@@ -2,25 +2,22 @@
 
 from collections.abc import Sequence
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tmsopt.paper.planes import OFF_LAW_CHI_B, OFF_LAW_TILT, Plane, chi_B_plane, tilt_plane
-from tmsopt.plots.chart import Legend, domain_curves, fill, fill_classes, grid_of, plane_of
+from tmsopt.plots.chart import Legend, draw_layer, plane_of
 from tmsopt.plots.labels import Name, place_all
-from tmsopt.plots.style import COMPLEX, HEAVY, MARK, REAL, STABLE, entry, legend_below, new_figure
+from tmsopt.plots.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, entry, legend_below, new_figure
 from tmsopt.plots.trace import draw_branch
 
 _LAWS = {
-    "Frc1": (r"$\mathrm{Fr}_c$ (Frc1)", STABLE, "-"),
+    "Frc1": (r"$\mathrm{Fr}_c$ (Frc1)", CRITICAL, "-"),
     "epset": ("EP set (epset)", HEAVY, "-"),
-    "tls": (r"$\tan\lambda_s$ (tls)", "white", ":"),
-    "chib1": (r"$\chi_B$ (chib1)", "white", ":"),
+    "tls": (r"$\tan\lambda_s$ (tls)", LINE, ":"),
+    "chib1": (r"$\chi_B$ (chib1)", LINE, ":"),
 }
 """Words, colour and line of each law over the colours of the abscissa."""
-
-_LEAST, _GREATEST = -1.9, 0.1  # of the abscissa in colours
 
 _ON_LAW = (r"(a) $\chi_B = \sqrt{2}$", r"(b) $\lambda_s = \lambda_s^{\mathrm{EP}_4} = 0.4107$ rad")
 
@@ -40,32 +37,26 @@ def off_law_figure() -> Figure:
 
 
 def abscissa_figure() -> Figure:
-    """The abscissa over both planes, one colour scale for them."""
+    """The abscissa over both planes, with the laws."""
     figure = new_figure(10.4, 4.4)
     panels, named = figure.subplots(1, 2), []
     for ax, make, title in zip(panels, (tilt_plane, chi_B_plane), _ON_LAW, strict=True):
         plane = make(points=(480, 360), boundaries=False)
-        chart, axes = plane.chart, plane_of(plane.chart)
-        mesh = fill(ax, chart, axes, "abscissa", cmap="cividis", vmin=_LEAST, vmax=_GREATEST)
-        levels = np.arange(-1.75, 0.01, 0.25)
-        ax.contour(*grid_of(chart, axes), chart.abscissa, levels, colors="white", linewidths=0.5, linestyles="-")
-        for law, (x, y) in plane.laws.items():
+        draw_layer(ax, plane.chart, plane_of(plane.chart), "abscissa")
+        for law, place in plane.laws.items():
             words, colour, style = _LAWS[law]
-            ax.plot(x, y, style, color=colour, label=words)
+            ax.plot(*place, style, color=colour, label=words)
         named.append((ax, _draw_marked(ax, plane)))
-        ax.legend(facecolor="0.25", loc="upper left", labelcolor="white")
+        ax.legend(loc="upper left")
         ax.set_title(title)
-    figure.colorbar(mesh, ax=panels.tolist(), label="spectral abscissa", extend="max")
     place_all(named)
     return figure
 
 
 def draw_plane(ax: Axes, plane: Plane) -> Legend:
     """Classes, exact boundaries with corners, the EP set and the marked points of a plane; names, legend entries."""
-    chart, axes = plane.chart, plane_of(plane.chart)
-    handles = fill_classes(ax, chart, axes)
-    names, curves = domain_curves(ax, chart.domain, axes)
-    handles += curves
+    axes = plane_of(plane.chart)
+    names, handles = draw_layer(ax, plane.chart, axes, "kind")
     if plane.ep_set is not None:
         handles += [entry("2EP2", REAL, linewidth=2), entry("CEP2", COMPLEX, "--", linewidth=2)]
         for branch in plane.ep_set.branches:

@@ -1,7 +1,5 @@
 """The swallowtail surface in three dimensions, with its cuspidal edges, its self-intersection and its sections."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -13,7 +11,6 @@ from tmsopt.paper.planes import SECTIONS, section, surface
 from tmsopt.plots.paper.planes import draw_planes
 from tmsopt.plots.style import COMPLEX, HEAVY, LINE, MARK, REAL, STABLE, entry, new_figure
 from tmsopt.records import Array
-from tmsopt.tracing.branch import Trace
 from tmsopt.tracing.swallowtail import Swallowtail
 
 _LIGHT = np.array([0.3, -0.6, 0.75])
@@ -44,18 +41,22 @@ def draw_swallowtail(data: Swallowtail, ax: Axes3D | None = None) -> Axes3D:
         colours.append(_shade_faces(pieces / width, HEAVY if patch.heavily_damped else STABLE))
     fills = np.concatenate(colours)
     ax.add_collection3d(Poly3DCollection(np.concatenate(quads), facecolors=fills, edgecolors=fills, linewidths=0.7))
-    _edges(ax, data.cusps, data.axes, {"EP3": (LINE, "-")})
-    _edges(ax, data.crossing, data.axes, {"2EP2": (REAL, "-"), "CEP2": (COMPLEX, "--")})
+    lines = (data.cusps, "EP3", LINE, "-"), (data.crossing, "2EP2", REAL, "-"), (data.crossing, "CEP2", COMPLEX, "--")
+    for trace, kind, colour, style in lines:
+        for branch in trace.branches:
+            here = np.isin(branch.kinds, (kind, "EP4"))
+            columns = [np.where(here, branch.parameters[n], np.nan) for n in data.axes]
+            ax.plot(*columns, style, color=colour, linewidth=1.8, zorder=9)
     for event in data.crossing.events:
         if event.name == "EP4":
             place = np.array([event.parameters[n] for n in data.axes])
-            ax.plot(*place[:, None], "o", color=MARK, markersize=6, zorder=10)
+            ax.plot(*place[:, None], "o", color=MARK, zorder=10)
             ax.text(*place[:2], place[2] + 0.05 * width[2], "EP4", fontsize=9, zorder=11)
     of = data.problem.posed.parameter_set
     for letter, name, ends in zip("xyz", data.axes, ranges, strict=True):
         ax.set(**{f"{letter}lim": ends, f"{letter}label": f"${of[name].latex}$"})
-    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
-        axis.set_major_locator(MaxNLocator(4, prune="both"))  # ticks of two axes must not meet at their corner
+        # ticks of two axes must not meet at their corner
+        getattr(ax, f"{letter}axis").set_major_locator(MaxNLocator(4, prune="both"))
     return ax
 
 
@@ -73,7 +74,7 @@ def swallowtail_figure() -> Figure:
     draw_swallowtail(surface(), ax)
     ax.view_init(elev=24, azim=-52)
     ax.set_box_aspect(None, zoom=0.86)  # leaves room for the vertical label
-    ax.set_title("(a) discriminant surface", fontsize=10)
+    ax.set_title("(a) discriminant surface")
     key = [
         entry("bounds heavy damping", HEAVY, linewidth=6),
         entry("elsewhere", STABLE, linewidth=6),
@@ -81,24 +82,14 @@ def swallowtail_figure() -> Figure:
         entry("2EP2, self-intersection", REAL),
         entry("CEP2", COMPLEX, "--"),
     ]
-    ax.legend(handles=key, fontsize=7.5, loc="upper left")
-    offsets = ["", *(f" {offset:+g}" for offset in SECTIONS[1:])]
+    ax.legend(handles=key, loc="upper left")
     titles = [
-        rf"({letter}) $\mathrm{{Fr}} = \mathrm{{Fr}}_{{\mathrm{{EP}}_4}}{offset}$"
-        for letter, offset in zip("bcd", offsets, strict=True)
+        rf"({letter}) $\mathrm{{Fr}} = \mathrm{{Fr}}_{{\mathrm{{EP}}_4}}{f' {offset:+g}' if offset else ''}$"
+        for letter, offset in zip("bcd", SECTIONS, strict=True)
     ]
     flat = [figure.add_subplot(2, 2, k) for k in (2, 3, 4)]
     draw_planes(figure, flat, [section(offset) for offset in SECTIONS], titles)
     return figure
-
-
-def _edges(ax: Axes3D, trace: Trace, axes: Sequence[str], styles: dict[str, tuple[str, str]]) -> None:
-    for branch in trace.branches:
-        kinds = branch.kinds
-        for kind, (colour, line) in styles.items():
-            here = (kinds == kind) | (kinds == "EP4")
-            columns = [np.where(here, branch.parameters[n], np.nan) for n in axes]
-            ax.plot(*columns, color=colour, linestyle=line, linewidth=1.8, zorder=9)
 
 
 def _shade_faces(faces: Array, colour: str) -> Array:
