@@ -75,13 +75,12 @@ def test_three_axes_are_planes_one_above_the_other(tmp_path):
 
 def test_a_grid_knows_its_designs():
     grid = Grid(("x", "y", "z"), (np.arange(4.0), np.arange(10, 13.0), np.arange(20, 22.0)))
-    z, y, x = np.meshgrid(*grid.values[::-1], indexing="ij")
-    assert grid.shape == x.shape == (2, 3, 4)
-    up = grid.columns(range(1, 5))
-    assert np.array_equal(up["x"], grid.values[:1])
-    assert np.array_equal(up["y"][:, 0], y.reshape(6, 4)[1:5, 0])
-    assert np.array_equal(up["z"][:, 0], z.reshape(6, 4)[1:5, 0])
-    assert grid.design(17) == {"x": x.flat[17], "y": y.flat[17], "z": z.flat[17]}
+    arrays = dict(zip("zyx", np.meshgrid(*grid.values[::-1], indexing="ij"), strict=True))
+    assert grid.shape == arrays["x"].shape == (2, 3, 4)
+    rows = grid.columns(range(1, 5))
+    for name, array in arrays.items():
+        assert np.array_equal(np.broadcast_to(rows[name], (4, 4)), array.reshape(6, 4)[1:5])
+    assert grid.design(17) == {name: array.flat[17] for name, array in arrays.items()}
     assert [r for tile in grid.tiles(9) for r in tile] == list(range(6))
 
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
-import casadi as ca
 import matplotlib.colors as mcolors
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from matplotlib.collections import LineCollection, QuadMesh
 import tmsopt
 from tmsopt import laws, plots
 from tmsopt.cli import every as main
-from tmsopt.models import from_coefficients
 
 WEAVE, CAPSIZE = 4.29238253634111, 6.02426201538837  # Meijaard et al. (2007), section 6
 MODES_AT_5 = {
@@ -291,31 +289,6 @@ def test_a_trace_has_the_colours_of_its_abscissa():
 
 
 # Fronts and studies
-
-
-@pytest.mark.slow
-def test_the_unstable_part_of_a_front_is_dashed_and_hollow():
-    """s² + (x − 2) s + 1 + y is stable where x > 2 alone."""
-    x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    model = from_coefficients([1, x - 2, 1 + y])
-    front = tmsopt.pareto(tmsopt.Problem(model, free={"x": (0, 3), "y": (0, 1)}, pareto=("abscissa", "x")), points=5)
-    stable = [p.solution.parameters["x"] > 2 for p in front.points]
-    values = [p.objectives for p in front.points]
-    lines = plots.draw_front(front, ax_of()).lines
-    dashed = [line.get_xydata().tolist() for line in lines if line.get_linestyle() == "--"]
-    solid = [
-        line.get_xydata().tolist() for line in lines if line.get_linestyle() == "-" and line.get_color() == "#000000"
-    ]
-    parts = [([list(values[k]), list(values[k + 1])], stable[k] and stable[k + 1]) for k in range(len(values) - 1)]
-    assert dashed == [part for part, whole in parts if not whole]
-    assert solid == [part for part, whole in parts if whole]
-    hollow = {
-        tuple(xy)
-        for line in lines
-        if line.get_markerfacecolor() == "white" and line.get_linestyle() == "None"
-        for xy in line.get_xydata().tolist()
-    }
-    assert hollow == {tuple(v) for v, s in zip(values, stable, strict=True) if not s}
 
 
 def test_a_histogram_counts_every_row_once():
