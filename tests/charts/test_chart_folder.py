@@ -423,24 +423,24 @@ def test_three_axes_in_one_file(ending, tmp_path, run):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["problems/realistic.toml"], "two or three free parameters"),
-        (["problems/chart.toml", "--points", "4x4x4"], "accepted: two whole numbers"),
-        (["problems/chart.toml", "--points", "10000x10000"], "give an --output that ends in chart"),
-        (["problems/chart.toml", "--quantity", "Fr*2"], "accepted: NAME=VALUE"),
-        (["problems/chart.toml", "--quantity", "x=Frr"], "unknown name 'Frr'"),
-        (["problems/chart.toml", "--layers", "kind,gamma"], "found 'gamma'; accepted: kind"),
-        (["problems/chart.toml", "--layer", "colour"], "--layer: found 'colour'; accepted: kind"),
-        (["problems/chart.toml", "--workers", "0"], "--workers"),
-        (["problems/chart.toml", "--slice", "Fr=1"], "nothing to hold"),
-        (["problems/ep_set.toml", "--plot", "x.png"], "hold one, as in --slice"),
-        (["problems/ep_set.toml", "--slice", "mu=1", "--plot", "x.png"], "--slice: found 'mu'"),
-        (["problems/ep_set.toml", "--slice", "Fr=99", "--plot", "x.png"], "--slice.Fr: found 99; accepted: "),
-        (["problems/ep_set.toml", "--slice", "Fr=fast", "--plot", "x.png"], "--slice.Fr: found 'fast'"),
-        (["problems/ep_set.toml", "--axes", "Fr,mu"], "accepted: Fr and chi_B and lambda_s"),
-        (["problems/chart.toml", "-o", "no/such/x.chart"], "does not exist"),
+        ("problems/realistic.toml", "two or three free parameters"),
+        ("problems/chart.toml --points 4x4x4", "accepted: two whole numbers"),
+        ("problems/chart.toml --points 10000x10000", "give an --output that ends in chart"),
+        ("problems/chart.toml --quantity Fr*2", "accepted: NAME=VALUE"),
+        ("problems/chart.toml --quantity x=Frr", "unknown name 'Frr'"),
+        ("problems/chart.toml --layers kind,gamma", "found 'gamma'; accepted: kind"),
+        ("problems/chart.toml --layer colour", "--layer: found 'colour'; accepted: kind"),
+        ("problems/chart.toml --workers 0", "--workers"),
+        ("problems/chart.toml --slice Fr=1", "nothing to hold"),
+        ("problems/ep_set.toml --plot x.png", "hold one, as in --slice"),
+        ("problems/ep_set.toml --slice mu=1 --plot x.png", "--slice: found 'mu'"),
+        ("problems/ep_set.toml --slice Fr=99 --plot x.png", "--slice.Fr: found 99; accepted: "),
+        ("problems/ep_set.toml --slice Fr=fast --plot x.png", "--slice.Fr: found 'fast'"),
+        ("problems/ep_set.toml --axes Fr,mu", "accepted: Fr and chi_B and lambda_s"),
+        ("problems/chart.toml -o no/such/x.chart", "does not exist"),
     ],
 )
 def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, run):
-    status, out, err = run("chart", *arguments)
+    status, out, err = run("chart", *arguments.split())
     assert (status, out) == (2, "")
     assert words in " ".join(err.split())

@@ -105,17 +105,17 @@ def test_only_what_is_asked_for_is_kept(tmp_path):
 
 def test_counts_are_those_of_the_arrays():
     rng = np.random.default_rng(0)
-    layers = {"kind": rng.integers(0, 5, (6, 10)).astype(np.int8), "satisfied": rng.random((6, 10)) < 0.5}
-    layers["abscissa"] = rng.normal(size=(6, 10)).round(1)
-    layers["abscissa"][2] = np.nan
+    kind, satisfied = rng.integers(0, 5, (6, 10)).astype(np.int8), rng.random((6, 10)) < 0.5
+    abscissa = rng.normal(size=(6, 10)).round(1)
+    abscissa[2] = np.nan
+    layers = {"kind": kind, "satisfied": satisfied, "abscissa": abscissa}
     parts = [count_tile({n: a[k : k + 2] for n, a in layers.items()}, 10 * k, 1) for k in (4, 0, 2)]
     found = add_tallies(parts)
-    allowed = np.where(layers["satisfied"], layers["abscissa"], np.nan)
+    allowed = np.where(satisfied, abscissa, np.nan)
     assert (found.least, found.place) == (np.nanmin(allowed), np.nanargmin(allowed))
-    assert found.shares == {n: np.mean(layers["kind"] == k) for k, n in enumerate(CLASSES)}
-    assert (found.satisfied, found.designs, found.fallbacks) == (layers["satisfied"].sum(), 60, 3)
-    none = count_tile({"abscissa": np.full((2, 2), np.nan)}, 0)
-    assert none.place == -1
+    assert found.shares == {n: np.mean(kind == k) for k, n in enumerate(CLASSES)}
+    assert (found.satisfied, found.designs, found.fallbacks) == (satisfied.sum(), 60, 3)
+    assert count_tile({"abscissa": np.full((2, 2), np.nan)}, 0).place == -1
 
 
 OSCILLATOR = Model(

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from tmsopt.charts.export import make_dataset, save_layers
 from tmsopt.charts.folder import SCHEMA, Tiles, grid_of, read_folder, write_folder
-from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, layer_faults, limits_of, plan_survey
-from tmsopt.charts.tally import Tally, add_tallies
+from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, Tally, add_tallies, layer_faults, limits_of, plan_survey
 from tmsopt.deprecated import ignore_option
 from tmsopt.errors import InputError, call_faults, count_faults, input_error
 from tmsopt.executor import Crash, here, processes

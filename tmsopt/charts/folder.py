@@ -18,7 +18,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from tokenize import TokenError
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -26,8 +25,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
-from tmsopt.charts.survey import LONGEST, MOST, MOST_TILES, Grid
-from tmsopt.charts.tally import Tally
+from tmsopt.charts.survey import LONGEST, MOST, MOST_TILES, Grid, Tally
 from tmsopt.errors import InputError, input_error
 from tmsopt.files import from_json, list_differences, move_aside, read_lines, read_text, write_text
 from tmsopt.models import MODELS
@@ -35,8 +33,6 @@ from tmsopt.problem.problem import Problem
 
 SCHEMA = 1
 
-# Exceptions from reading a damaged folder; a link to itself is a RuntimeError.
-_DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, OverflowError, TokenError)
 _ABOUT, _TILES, _LOCK = "about.json", "tiles.jsonl", "chart.lock"
 _LONG_ABOUT, _LONG_LINE = 16_000_000, 10_000  # bytes
 _SYNC = 1.0  # seconds between records of finished tiles
@@ -222,7 +218,7 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
         name = _TILES
         record = _find_file(path, name)
         done, end = _read_record(record, about["tile"], grid)
-    except _DAMAGE as error:
+    except Exception as error:  # a damaged folder can raise anything, such as a link to itself a RuntimeError
         reason = " ".join(str(error).split())[:300]
         raise input_error(
             f"'{path}' is damaged: {name}: {reason}; give --fresh to move it aside and start anew"

@@ -1,8 +1,8 @@
-"""Grids over two or three parameters, and what is computed for their designs, a few rows at a time."""
+"""Grids over two or three parameters; what is computed for their designs, a few rows at a time, and counted."""
 
 import math
 import operator
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any
@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from tmsopt.charts.tally import Tally, count_tile
 from tmsopt.errors import Fault, InputError, input_error, list_faults, short, suggest, table_faults
 from tmsopt.problem.advice.names import example_of
 from tmsopt.problem.evaluate import ArrayFunction, array_function, parse_all
@@ -18,7 +17,7 @@ from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_NAMES
 from tmsopt.records import Array
-from tmsopt.roots import classify, find_motion
+from tmsopt.roots import CLASSES, classify, find_motion
 
 LAYERS: Mapping[str, DTypeLike] = {
     "kind": np.int8,
@@ -96,6 +95,32 @@ class Grid:
                 f"found {points}, which makes {count} tiles; accepted: {MOST_TILES} tiles or fewer", "tile"
             )
         return [rows[k : k + each] for k in rows[::each]]
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Counts over some of the designs.
+
+    Attributes:
+        designs: number of designs.
+        classes: number in each class; empty without the layer ``kind``.
+        satisfied: number that satisfy every inequality; None without that layer.
+        least: least abscissa of these; nan if there is none.
+        place: its index in the flat arrays, the first of equals; -1 if there is none.
+        fallbacks: number of designs whose roots came from companion eigenvalues.
+    """
+
+    designs: int = 0
+    classes: tuple[int, ...] = ()
+    satisfied: int | None = None
+    least: float = math.nan
+    place: int = -1
+    fallbacks: int = 0
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Share of the designs in each class; empty without the layer ``kind``."""
+        return {n: count / self.designs for n, count in zip(CLASSES, self.classes, strict=False)}
 
 
 @dataclass(frozen=True)
@@ -230,3 +255,37 @@ def _sizes(points: Any, count: int) -> tuple[int, ...]:
         accepted = f"{number} whole numbers, each from 2 to {LONGEST}, with a product of {MOST:.0e} or less"
         raise input_error(f"found {points!r}; accepted: {accepted}", "points")
     return sizes
+
+
+def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 0) -> Tally:
+    """Count over a tile whose first design has the index `first`."""
+    kind, satisfied, abscissa = (layers.get(n) for n in ("kind", "satisfied", "abscissa"))
+    least, place = math.nan, -1
+    if abscissa is not None:
+        allowed = np.where(np.isfinite(abscissa) & (True if satisfied is None else satisfied), abscissa, np.inf)
+        best = int(allowed.argmin())
+        if allowed.flat[best] < np.inf:
+            least, place = float(allowed.flat[best]), first + best
+    return Tally(
+        next(iter(layers.values())).size,
+        () if kind is None else tuple(np.bincount(kind.ravel(), minlength=len(CLASSES)).tolist()),
+        None if satisfied is None else int(np.count_nonzero(satisfied)),
+        least,
+        place,
+        fallbacks,
+    )
+
+
+def add_tallies(tallies: Iterable[Tally]) -> Tally:
+    """Add the counts of several tiles, in any order."""
+    every = [*tallies]
+    best = min((t for t in every if t.place >= 0), key=lambda t: (t.least, t.place), default=Tally())
+    satisfied = [t.satisfied for t in every if t.satisfied is not None]
+    return Tally(
+        sum(t.designs for t in every),
+        tuple(map(sum, zip(*(t.classes for t in every), strict=True))),
+        sum(satisfied) if satisfied else None,
+        best.least,
+        best.place,
+        sum(t.fallbacks for t in every),
+    )

@@ -7,8 +7,7 @@ from itertools import accumulate, islice, pairwise
 
 from tmsopt.executor import Executor
 from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient_points
-from tmsopt.fronts.parallel import MAX_PARALLEL, map_items
-from tmsopt.fronts.subproblems import FrontSolver, front_point, minimise_limited
+from tmsopt.fronts.subproblems import MAX_PARALLEL, FrontSolver, front_point, map_items, minimise_limited
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Steps
 from tmsopt.search.solve import add_cover

@@ -1,5 +1,6 @@
-"""Growth rates and frequencies over the speed, or another parameter, with their modes named."""
+"""Growth rates and frequencies over the speed, or another parameter, with their modes named; the events as a ruler."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from matplotlib.typing import LineStyleType
 
 from tmsopt.dynamics.growth import SPEEDS, Growth, growth
 from tmsopt.dynamics.modes import Mode
+from tmsopt.dynamics.speeds import Speeds
 from tmsopt.plots.labels import OF_H, AxisScale, Name, events_of, finish_axes, place_all, scale_over
 from tmsopt.plots.style import (
     CAPSIZE,
@@ -21,6 +23,7 @@ from tmsopt.plots.style import (
     draw_bands,
     legend_below,
     new_figure,
+    note,
     on_axes,
 )
 from tmsopt.problem.solution import Solution
@@ -52,6 +55,9 @@ _LABELS = {
 _NOTHING = 1e-12  # of the range: less is 0 but for rounding
 
 _ROOM = 0.08  # of all that is shown of H, above and below it
+
+_LEVELS = 3  # heights at which names of events stand in turn
+_MARGIN = 1.15  # times the last event
 
 _Curve = tuple[Mode, Array]
 """A mode, and its growth rates or frequencies as they stand on the axis."""
@@ -113,6 +119,40 @@ def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: f
     legend_below(figure, upper.get_legend_handles_labels()[0])
     place_all(named)
     return figure
+
+
+def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
+    """Every place where a root crosses the imaginary axis or roots meet.
+
+    The Axes show a ruler of the parameter, in the unit of the file, to a little beyond the last event: each event with
+    its name and value, heavier where stability changes, bands of stability and heavy damping, and the design.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_speeds(tmsopt.speeds("problems/benchmark.toml"))
+        >>> [text.get_text() for text in axes.texts]
+        ['EP2 0.009546', 'weave 2.841']
+
+    More: docs/explanation/weave_and_capsize.md
+    """
+    problem = data.problem
+    ax = on_axes(ax, 6.4, 2.4, problem.title)
+    scale, words = scale_over(problem.posed, problem.posed.parameter_set[data.parameter]), events_of(problem.model)
+    at = data.parameters.get(data.parameter, data.lower)
+    last = _MARGIN * max(c.at for c in data.found) if data.found else data.lower + 2 * abs(at) + 1
+    high = data.upper if math.isfinite(data.upper) else max(last, _MARGIN * at)
+    draw_bands(ax, *(scale.to_axis(np.minimum(bands, high)) for bands in (data.stable, data.heavily_damped)))
+    for k, event in enumerate(data.found):
+        x, height = float(scale.to_axis(event.at)), 0.95 - 0.62 * (k % _LEVELS) / _LEVELS
+        colour, _ = EVENTS.get(event.kind, (REAL, ""))
+        ax.plot([x, x], [0, height], color=colour, linewidth=2.0 if event.changes else 0.9)
+        side = 3 if event.at < (data.lower + high) / 2 else -3
+        note(ax, f"{words.get(event.kind, event.kind)} {x:.4g}", (x, height), (side, 0), verticalalignment="top")
+    if data.parameter in data.parameters:
+        label = f"design at {scale.unit.show(at, 4)}"
+        ax.plot(scale.to_axis(at), 0.06, "^", color=LINE, label=label, clip_on=False)
+    ax.set(xlim=scale.to_axis([data.lower, high]), ylim=(0, 1.05), yticks=[], xlabel=scale.label)
+    ax.spines[["left", "right", "top"]].set_visible(False)
+    return finish_axes(ax)
 
 
 def _draw(data: Growth | Solution, ax: Axes | None, part: str) -> Axes:

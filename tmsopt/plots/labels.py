@@ -25,8 +25,6 @@ _SAME = 0.02  # of an axis: names of marks so close would stand beside the wrong
 OF_H = {"real": r"$\mathrm{Im}\,\omega$ (loss negative)", "imag": r"$\mathrm{Re}\,\omega$"}
 """Axes of the real and imaginary parts of s = −i ω of a complex H."""
 
-FROUDE = r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$"
-
 
 @dataclass(frozen=True)
 class Name:
@@ -96,12 +94,11 @@ def scale_of(problem: Posed, text: str) -> AxisScale:
 
 def scale_over(problem: Posed, parameter: Parameter) -> AxisScale:
     """The axis of a parameter of a problem, or of a native one that the problem is not written in."""
+    if parameter.name == "Fr":
+        return AxisScale("Fr", r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$")
     if parameter.name in problem.parameter_set.names:
-        found = scale_of(problem, parameter.name)
-    else:
-        unit = "" if parameter.unit == "1" else parameter.unit
-        found = AxisScale(parameter.name, f"${parameter.latex}$", Unit(unit))
-    return AxisScale("Fr", FROUDE) if parameter.name == "Fr" else found
+        return scale_of(problem, parameter.name)
+    return AxisScale(parameter.name, f"${parameter.latex}$", Unit("" if parameter.unit == "1" else parameter.unit))
 
 
 def abscissa_label(problem: Posed, words: str = "spectral abscissa") -> str:

@@ -12,17 +12,8 @@ from tmsopt.plots.labels import Name, PlaneAxes, abscissa_label, finish_axes, pl
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, figure_of, on_axes
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 
-COLOURS = {
-    "EP4": MARK,
-    "EP3": MARK,
-    "2EP2": REAL,
-    "CEP2": COMPLEX,
-    "EP2": LINE,
-    "weave": CRITICAL,
-    "capsize": CAPSIZE,
-    "resonance": COMPLEX,
-}
-"""Colour of each pattern; complex ones are dashed besides."""
+_COLOURS = {"EP2": LINE, "weave": CRITICAL, "capsize": CAPSIZE, "resonance": COMPLEX}
+"""Colours of patterns that are no higher roots; complex ones are dashed besides."""
 
 _UNLABELLED = ("fold", "constraint", "end")
 _BANDS = 6.0, 2.5
@@ -85,8 +76,8 @@ def draw_branch(
 
 def colour(kind: str) -> str:
     """Colour of a pattern of any degree: one for all higher roots, for several real ones, and for complex pairs."""
-    if kind in COLOURS:
-        return COLOURS[kind]
+    if kind in _COLOURS:
+        return _COLOURS[kind]
     return COMPLEX if "CEP" in kind else REAL if "+" in kind or kind[0].isdigit() else MARK
 
 

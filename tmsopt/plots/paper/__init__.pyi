@@ -5,10 +5,8 @@ from .bicycles import (
 from .gallery import GALLERY as GALLERY, Item as Item, find as find, pictures as pictures
 from .locus import draw_row as draw_row, full_window as full_window, root_locus_figure as root_locus_figure
 from .planes import (
-    abscissa_figure as abscissa_figure, draw_plane as draw_plane, ep_set_figure as ep_set_figure,
-    off_law_figure as off_law_figure,
-)
-from .swallowtail import (
-    draw_swallowtail as draw_swallowtail, quadrilaterals as quadrilaterals, swallowtail_figure as swallowtail_figure,
+    abscissa_figure as abscissa_figure, draw_plane as draw_plane, draw_swallowtail as draw_swallowtail,
+    ep_set_figure as ep_set_figure, off_law_figure as off_law_figure, quadrilaterals as quadrilaterals,
+    swallowtail_figure as swallowtail_figure,
 )
 from .universal import draw_box as draw_box, draw_section as draw_section, universal_figure as universal_figure

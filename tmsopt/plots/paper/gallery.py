@@ -50,11 +50,10 @@ def find(name: str) -> Item:
     """
     from tmsopt.errors import input_error, suggest
 
-    for item in GALLERY.values():
-        if name in (item.name, item.alias):
-            return item
-    accepted = [*GALLERY, *(item.alias for item in GALLERY.values() if item.alias)]
-    raise input_error(f"found '{name}'; {suggest(name, accepted)}", "NAME")
+    named = {key: item for item in GALLERY.values() for key in (item.name, item.alias) if key}
+    if name not in named:
+        raise input_error(f"found '{name}'; {suggest(name, named)}", "NAME")
+    return named[name]
 
 
 _ITEMS = (

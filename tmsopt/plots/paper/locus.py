@@ -1,7 +1,6 @@
 """Root loci in the complex plane, drawn into Axes that the caller made."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,9 +17,6 @@ _CURVES = ((LINE, 1.5), (CRITICAL, 1.0), (MARK, 1.0))
 NAMES = {"EP4": r"$\mathrm{EP}_4$", "2EP2": r"$2\mathrm{EP}_2$", "CEP2": r"$\mathrm{CEP}_2$", "EP2": r"$\mathrm{EP}_2$"}
 """Multiple roots in the symbols of the paper."""
 
-_CIRCLE: dict[str, Any] = {"color": "0.55", "linewidth": 3.5, "alpha": 0.45}
-_CROSSING: dict[str, Any] = {"markersize": 4.5, "markerfacecolor": "white", "color": LINE}
-
 Window = Array
 """Left, right, low and high."""
 
@@ -31,7 +27,8 @@ def draw_row(ax: Axes, row: LocusRow, window: Window, arrows: int) -> list[Name]
     ax.axhline(0, color="0.75", linewidth=0.6)
     ax.axvline(0, color="0.4", linewidth=0.8)
     angle = np.linspace(0, 2 * np.pi, 361)
-    ax.plot(size * np.cos(angle), size * np.sin(angle), gid="circle", **_CIRCLE)
+    label = rf"$|s| = |\omega_0| = {size:.4f}$"
+    ax.plot(size * np.cos(angle), size * np.sin(angle), "0.8", linewidth=3.5, gid="circle", label=label)
     ax.set(xlim=window[:2], ylim=window[2:], aspect="equal")
     for data, (colour, width) in reversed([*zip(row.loci, _CURVES, strict=True)]):
         for mode in data.modes:
@@ -41,12 +38,17 @@ def draw_row(ax: Axes, row: LocusRow, window: Window, arrows: int) -> list[Name]
                 draw_arrows(ax, track, 2 if data is law else arrows, colour)
     names = []
     for name, _, s in multiple_roots(law):
-        ax.plot(s.real, s.imag, "o", color=COMPLEX if s.imag else REAL, zorder=5, gid=name, **EDGE)
+        colour, kind = (COMPLEX, "complex double") if s.imag else (REAL, "real multiple")
+        label = rf"{kind} root, $\chi_B = \sqrt{{2}}$"
+        ax.plot(
+            s.real, s.imag, "o", color=colour, zorder=5, gid=name, label=kind + r" root, $\chi_B = \sqrt{2}$", **EDGE
+        )
         on_circle = name == "EP2" and abs(abs(s.real) - size) < 1e-6
         text = (r"$-\omega_0$" if s.real > 0 else r"$\omega_0$") if on_circle else NAMES[name]
         names.append(Name(text, s.real, s.imag))
     for y in (event.root.im for event in law.events if event.changes):
-        ax.plot([0, 0], [y, -y], "D", zorder=5, gid="crossing", **_CROSSING)
+        label = r"$\mathrm{Fr} = \mathrm{Fr}_c$, $\chi_B = \sqrt{2}$"
+        ax.plot([0, 0], [y, -y], "D", markersize=4.5, mfc="white", color=LINE, zorder=5, gid="crossing", label=label)
     return names
 
 
@@ -69,14 +71,8 @@ def root_locus_figure() -> Figure:
         left.legend(handles=handles, loc="upper right", title=r"$\chi_B$", handlelength=1.4)
     for ax in axes[-1]:
         ax.set_xlabel(r"$\mathrm{Re}\,s$")
-    dot: dict[str, Any] = {"style": "none", "marker": "o", **EDGE}
-    key = [
-        entry(rf"$|s| = |\omega_0| = {abs(rows[0].bicycle.omega0):.4f}$", **_CIRCLE),
-        entry(r"real multiple root, $\chi_B = \sqrt{2}$", REAL, **dot),
-        entry(r"complex double root, $\chi_B = \sqrt{2}$", COMPLEX, **dot),
-        entry(r"$\mathrm{Fr} = \mathrm{Fr}_c$, $\chi_B = \sqrt{2}$", style="none", marker="D", **_CROSSING),
-        entry(rf"$\mathrm{{Fr}}$ increases from 0 to {FR_MAX:g}", LINE, marker=">"),
-    ]
+    key = [handle for ax in axes.flat for handle in ax.get_legend_handles_labels()[0]]
+    key.append(entry(rf"$\mathrm{{Fr}}$ increases from 0 to {FR_MAX:g}", LINE, marker=">"))
     legend_below(figure, key, 3)
     place_all(names)
     return figure

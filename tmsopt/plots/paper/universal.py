@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
 from tmsopt.paper.universal import UniversalPath, ep_set, heavy_section, spire_faces, table_1_paths
 from tmsopt.plots.paper.locus import NAMES, draw_arrows
-from tmsopt.plots.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, entry, legend_below, new_figure
+from tmsopt.plots.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, legend_below, new_figure
 from tmsopt.records import Array
 
 _COLOURS = (LINE, CRITICAL, MARK)
@@ -46,9 +45,9 @@ def draw_box(ax: Axes3D, paths: Sequence[UniversalPath], faces: Sequence[Array])
 
 def draw_section(ax: Axes, paths: Sequence[UniversalPath]) -> None:
     """The plane A1 = A3: stability, heavy damping, the EP set, and the paths."""
-    ax.fill_between([0, _LIMIT], 2, _HIGH, color=STABLE, alpha=0.18, linewidth=0)
-    a = np.linspace(4, _LIMIT, 200)
-    ax.fill_between(a, *heavy_section(a), color=HEAVY, alpha=0.55, linewidth=0)
+    above, a = "stable above $A_2 = A_1/A_3 + A_3/A_1$", np.linspace(4, _LIMIT, 200)
+    ax.fill_between([0, _LIMIT], 2, _HIGH, color=STABLE, alpha=0.18, linewidth=0, label=above)
+    ax.fill_between(a, *heavy_section(a), color=HEAVY, alpha=0.55, linewidth=0, label="heavy damping")
     ax.plot(a, 2 * a - 2, color=_EDGE)
     ax.axhline(2, color=STABLE)
     ax.set(xlim=(0, _LIMIT), ylim=(_LOW, _HIGH), yticks=range(0, 16, 5), xlabel="$A_1 = A_3$", ylabel="$A_2$")
@@ -75,19 +74,7 @@ def universal_figure() -> Figure:
     draw_section(right, paths)
     left.set_title("(a) every quartic with $a_4/a_0 > 0$, scaled")
     right.set_title("(b) section $A_1 = A_3$")
-    key = [
-        *(
-            entry(rf"{NAMES[p.name]} of Table 1, $\lambda_s = {p.tilt:.4f}$", colour, marker=">", markersize=4)
-            for p, colour in zip(paths, _COLOURS, strict=True)
-        ),
-        entry(r"$\mathrm{Fr}$ where stability begins", LINE, "none", marker="D", markerfacecolor="white"),
-        entry("on the EP set", LINE, "none", marker="o", markerfacecolor="0.8"),
-        entry(NAMES["2EP2"], REAL, linewidth=2),
-        entry(NAMES["CEP2"], COMPLEX, "--", linewidth=2),
-        Patch(facecolor=HEAVY, edgecolor=_EDGE, alpha=0.55, label="heavy damping"),
-        Patch(facecolor=STABLE, alpha=0.25, label="stable above $A_2 = A_1/A_3 + A_3/A_1$"),
-    ]
-    legend_below(figure, key, 4)
+    legend_below(figure, right.get_legend_handles_labels()[0], 4)
     return figure
 
 
@@ -97,16 +84,17 @@ def _draw_paths(ax: Any, paths: Sequence[UniversalPath], columns: list[int]) -> 
     Returns:
         The points of each path that the axes show; a 3-D plot does not clip.
     """
-    for low, high, colour, style in ((0.0, 4.0, COMPLEX, "--"), (4.0, _LIMIT, REAL, "-")):
+    for low, high, name, colour, style in ((0.0, 4.0, "CEP2", COMPLEX, "--"), (4.0, _LIMIT, "2EP2", REAL, "-")):
         points = ep_set(np.linspace(low, high, 100))[:, columns]
-        ax.plot(*points.T, style, color=colour, linewidth=2.0, zorder=4, gid="ep-set")
+        ax.plot(*points.T, style, color=colour, linewidth=2.0, zorder=4, gid="ep-set", label=NAMES[name])
     shown = []
     for path, colour in zip(paths, _COLOURS, strict=True):
         inside = np.all((path.A <= (_LIMIT, _HIGH, _LIMIT)) & (path.A[:, 1:2] >= _LOW), axis=1)
         shown.append(path.A[inside][:, columns])
-        ax.plot(*shown[-1].T, color=colour, gid="path", zorder=5)
-        fill = COMPLEX if path.name == "CEP2" else REAL
-        marks = ("D", "white", path.stable, "stable"), ("o", fill, path.exceptional, path.name)
-        for marker, inner, at, name in marks:
-            ax.plot(*at[columns, None], marker, mfc=inner, mec=colour, zorder=6, gid=name)
+        label = rf"{NAMES[path.name]} of Table 1, $\lambda_s = {path.tilt:.4f}$"
+        ax.plot(*shown[-1].T, color=colour, gid="path", zorder=5, label=label)
+        fill, begins = COMPLEX if path.name == "CEP2" else REAL, r"$\mathrm{Fr}$ where stability begins"
+        marks = ("D", "white", path.stable, "stable", begins), ("o", fill, path.exceptional, path.name, "on the EP set")
+        for marker, inner, at, name, label in marks:
+            ax.plot(*at[columns, None], marker, mfc=inner, mec=colour, zorder=6, gid=name, label=label)
     return shown
