@@ -25,7 +25,6 @@ from tmsopt.search import solve_any_status
 cases = import_module("tmsopt.problem.cases")
 front_data = import_module("tmsopt.fronts.front")
 options = import_module("tmsopt.program.options")
-solve = import_module("tmsopt.search.solve")
 worst_case = import_module("tmsopt.evaluation.worst_case")
 subproblems = import_module("tmsopt.fronts.subproblems")
 
@@ -80,23 +79,17 @@ def least_Fr(sigma):
 
 
 def tilted(sigma, W):
+    def slack(w):
+        return on_one_line(sigma, w)[2] - T_MIN
+
     levels = [W * k / 20 for k in range(21)] + [W + 3 * k / 30 for k in range(1, 31)]
-    slack = [on_one_line(sigma, w)[2] - T_MIN for w in levels]
-    crossings = [
-        brentq(lambda w: on_one_line(sigma, w)[2] - T_MIN, a, b, xtol=1e-15)
-        for (a, b), (x, y) in zip(pairwise(levels), pairwise(slack), strict=True)
-        if x * y <= 0
-    ]
+    crossings = [brentq(slack, a, b, xtol=1e-15) for a, b in pairwise(levels) if slack(a) * slack(b) <= 0]
     return min(crossings, key=lambda w: on_one_line(sigma, w)[0])
 
 
 def ep3_kink():
     """σ where dFr/dW = 0 at W = 0: beyond it the triple root is best."""
-
-    def slope(sigma):
-        return on_one_line(sigma, 1e-6)[0] - on_one_line(sigma, 0.0)[0]
-
-    return brentq(slope, 1.5, 1.87)
+    return brentq(lambda sigma: on_one_line(sigma, 1e-6)[0] - on_one_line(sigma, 0.0)[0], 1.5, 1.87)
 
 
 def tilt_kink():
