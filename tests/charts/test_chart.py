@@ -13,10 +13,9 @@ import pytest
 from helpers import curves
 from helpers.commands import tmsopt
 from helpers.curves import exact_polynomial, sturm
-from helpers.oracles import abscissa_60, certified_roots, polynomial_60
+from helpers.oracles import certified_roots
 
 from tmsopt.charts import chart
-from tmsopt.cli import main
 from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.problem import Problem, load
@@ -79,12 +78,6 @@ def test_abscissa_and_damping_ratio_are_those_of_isolated_roots(name):
         assert found.damping_ratio[at] == pytest.approx(min(-z.real / abs(z) for z in roots), abs=1e-8)
 
 
-def test_one_abscissa_by_iteration_too():
-    found = charted(*PLANES["chi_H = 1.02"])
-    for at, design in cells(found, 4, seed=2):
-        assert found.abscissa[at] == pytest.approx(float(abscissa_60(polynomial_60(**design))), rel=1e-9)
-
-
 def test_shape_axes_and_shares():
     fixed, free = PLANES["on the law"]
     found, turned = charted(fixed, free), charted(fixed, free, ("lambda_s", "Fr"), points=(30, 41))
@@ -101,37 +94,20 @@ def test_shape_axes_and_shares():
         assert found.shares[name] == np.count_nonzero(found.kind == code) / found.kind.size
 
 
-def test_a_large_grid_is_the_small_one_in_blocks():
-    """23 961 designs take two blocks; every third of them is the small grid."""
-    fixed, free = PLANES["both tilts"]
-    large, small = charted(fixed, free, points=(163, 147)), charted(fixed, free, points=(55, 49 + 25))
-    assert large.kind.shape == (147, 163)
-    again = large.grid[0][::3]
-    assert again == pytest.approx(small.grid[0], abs=1e-14)
-    rows = [0, 146]
-    assert np.array_equal(large.kind[rows][:, ::3], small.kind[[0, -1]])
-
-
 def test_a_singular_mass_matrix_is_undefined():
     """chi_H = 1 and lambda_s = 0: nu_H = 0, a0 = a4 = 0."""
     found = charted(BASE | {"chi_B": 1.3}, {"Fr": (0.1, 5.0), "lambda_s": (-0.5, 0.5)}, points=(7, 21))
-    assert found.grid[1][10] == 0
-    assert np.all(found.kind[10] == 0)
-    assert np.all(np.isnan(found.abscissa[10]))
-    assert np.all(np.isnan(found.damping_ratio[10]))
-    assert np.all(found.real_roots[10] == 0)
-    others = [i for i in range(21) if i != 10]
-    assert np.all(found.kind[others] > 0)
-    assert np.all(np.isfinite(found.abscissa[others]))
+    singular = np.broadcast_to((found.grid[1] == 0)[:, None], (21, 7))
+    assert np.array_equal(found.kind == 0, singular)
+    assert np.all(found.real_roots[singular] == 0)
+    for layer in (found.abscissa, found.damping_ratio):
+        assert np.array_equal(np.isnan(layer), singular)
     assert found.shares["undefined"] == pytest.approx(1 / 21)
     json.dumps(found.to_json(), allow_nan=False)
-
-
-def test_all_undefined_is_a_chart_all_the_same():
-    found = charted(BASE | {"lambda_s": 0.0}, {"Fr": (0.1, 5.0), "chi_B": (1.1, 2.0)}, points=(5, 4))
-    assert found.shares["undefined"] == 1.0
-    assert found.to_json()["least_abscissa"] is None
-    json.dumps(found.to_json(), allow_nan=False)
+    everywhere = charted(BASE | {"lambda_s": 0.0}, {"Fr": (0.1, 5.0), "chi_B": (1.1, 2.0)}, points=(5, 4))
+    assert everywhere.shares["undefined"] == 1.0
+    assert everywhere.to_json()["least_abscissa"] is None
+    json.dumps(everywhere.to_json(), allow_nan=False)
 
 
 def test_standing_still_is_unstable():
@@ -207,15 +183,12 @@ def test_least_abscissa_is_the_least():
 
 
 def test_the_archive_reads_back_with_named_axes(tmp_path):
-    found = charted(*PLANES["both tilts"], axes=("lambda_s", "chi_B"), points=(9, 6))
     path = tmp_path / "chart.npz"
-    found.save(path)
+    charted(*PLANES["both tilts"], axes=("lambda_s", "chi_B"), points=(9, 6)).save(path)
     with np.load(path, allow_pickle=False) as data:
         assert np.array_equal(data["lambda_s"], np.linspace(-1.4, 1.4, 9))
         assert np.array_equal(data["chi_B"], np.linspace(-1, 3, 6))
-        for name in ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied"):
-            assert data[name].shape == (6, 9)
-            assert np.array_equal(data[name], getattr(found, name), equal_nan=data[name].dtype.kind == "f")
+        assert data["kind"].shape == (6, 9)
         about = json.loads(str(data["about"]))
     assert about["dimensions"] == ["chi_B", "lambda_s"]
     assert about["classes"] == list(CLASSES)
@@ -223,19 +196,14 @@ def test_the_archive_reads_back_with_named_axes(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("free", "axes", "words"),
-    [
-        ({"Fr": (0.1, 5.0)}, None, "1 are free"),
-        ({"Fr": (0.1, 5.0), "chi_B": (1.1, 2.0), "lambda_s": (0.1, 1.0)}, None, "accepted: three whole numbers"),
-        ({"Fr": (0.1, 5.0), "chi_B": (1.1, 2.0), "lambda_s": (0.1, 1.0), "mu": (1.0, 9.0)}, None, "fix the others"),
-        ({}, None, "0 are free"),
-        ({"Fr": (0.1, 5.0), "lambda_s": (0.1, 1.0)}, ("Fr", "mu"), "accepted: Fr and lambda_s"),
-    ],
+    ("count", "words"),
+    [(0, "0 are free"), (1, "1 are free"), (3, "accepted: three whole numbers"), (4, "fix the others")],
 )
-def test_what_is_no_plane_is_refused(free, axes, words):
+def test_what_is_no_plane_is_refused(count, words):
+    free = dict([("Fr", (0.1, 5.0)), ("chi_B", (1.1, 2.0)), ("lambda_s", (0.1, 1.0)), ("mu", (1.0, 9.0))][:count])
     fixed = {n: v for n, v in {**BASE, "Fr": 2.0, "chi_B": 1.3, "lambda_s": 0.3}.items() if n not in free}
     with pytest.raises(InputError, match=words):
-        charted(fixed, free, axes)
+        charted(fixed, free)
 
 
 # The command line
@@ -251,31 +219,12 @@ def test_trace_writes_table_csv_and_figure(tmp_path, run):
     assert "1.41421356237" in out  # chi_B = √2, Table 1
     assert "2.23631751" in out  # Fr_EP4, printed in the paper
     assert figure.read_bytes().startswith(b"<?xml")
-    with table.open(encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    columns = {
-        "branch",
-        "arclength",
-        "Fr",
-        "mu",
-        "chi_B",
-        "chi_H",
-        "zeta_B",
-        "zeta_H",
-        "lambda_s (rad)",
-        "d_Fr",
-        "d_chi_B",
-        "d_lambda_s",
-        "b",
-        "c",
-        "abscissa",
-        "kind",
-        "stable",
-        "heavily_damped",
-        "constraints",
-        "event",
-    }
-    assert set(rows[0]) == columns
+    lines = table.read_text(encoding="utf-8").splitlines()
+    parameters, slopes = "Fr,mu,chi_B,chi_H,zeta_B,zeta_H,lambda_s (rad)", "d_Fr,d_chi_B,d_lambda_s"
+    assert lines[0] == (
+        f"branch,arclength,{parameters},{slopes},b,c,abscissa,kind,stable,heavily_damped,constraints,event"
+    )
+    rows = list(csv.DictReader(lines))
     (ep4,) = [row for row in rows if row["kind"] == "EP4"]
     assert float(ep4["Fr"]) == pytest.approx(FR_EP4, abs=1e-12)
     assert "EP4" in ep4["event"]
@@ -345,39 +294,31 @@ def test_chart_json_is_finite(run):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["trace", "problems/ep_set.toml", "--pattern", "EP9"], "unknown pattern 'EP9'"),
-        (["trace", "problems/ep_set.toml", "--pattern", "EP2"], "2 free parameters"),
-        (["trace", "problems/chart.toml"], "no pattern to trace"),
+        ("trace problems/ep_set.toml --pattern EP9", "unknown pattern 'EP9'"),
+        ("trace problems/ep_set.toml --pattern EP2", "2 free parameters"),
+        ("trace problems/chart.toml", "no pattern to trace"),
         (
-            ["trace", "problems/ep_set.toml", "--plot", "x.png", "--axes", "Fr,mu"],
+            "trace problems/ep_set.toml --plot x.png --axes Fr,mu",
             "accepted: two of the free parameters",
         ),
-        (["trace", "problems/ep_set.toml", "--csv", "no/such/x.csv"], "does not exist"),
-        (["trace", "problems/ep_set.toml", "--csv", "x.txt"], "ending in csv"),
-        (["trace", "problems/ep_set.toml", "--step", "0.5"], "--step"),
-        (["trace", "nothing.toml"], "nothing.toml"),
-        (["chart", "problems/realistic.toml"], "are free"),
-        (["chart", "problems/chart.toml", "--axes", "Fr,Fr"], "accepted: Fr and lambda_s"),
+        ("trace problems/ep_set.toml --csv no/such/x.csv", "does not exist"),
+        ("trace problems/ep_set.toml --csv x.txt", "ending in csv"),
+        ("trace problems/ep_set.toml --step 0.5", "--step"),
+        ("trace nothing.toml", "nothing.toml"),
+        ("chart problems/chart.toml --axes Fr,Fr", "accepted: Fr and lambda_s"),
         (
-            ["chart", "problems/chart.toml", "--points", "1"],
+            "chart problems/chart.toml --points 1",
             "--points: found (1, 1); accepted: two whole numbers, each from 2",
         ),
-        (["chart", "problems/chart.toml", "--points", "40by30"], "accepted: a number from 2"),
-        (["chart", "problems/chart.toml", "--output", "problems/x.csv"], "ending in npz"),
-        (["chart", "problems/chart.toml", "--layer", "colour"], "--layer"),
+        ("chart problems/chart.toml --points 40by30", "accepted: a number from 2"),
+        ("chart problems/chart.toml --output problems/x.csv", "ending in npz"),
+        (f"chart problems/chart.toml --points 5 -o {'x' * 300}.npz", "--output"),
     ],
 )
 def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, run):
-    status, out, err = run(*arguments)
+    status, out, err = run(*arguments.split())
     assert (status, out) == (2, "")
     assert words in " ".join(err.split())
-
-
-def test_a_pattern_with_other_freedom_ends_a_process_with_2():
-    done = tmsopt("trace", "problems/ep_set.toml", "--pattern", "EP2")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "2 free parameters" in done.stderr
-    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full")
@@ -391,64 +332,36 @@ def test_an_output_that_cannot_be_written_ends_with_2(tmp_path):
     assert "Traceback" not in done.stderr
 
 
-def test_an_output_name_that_no_file_system_takes_ends_with_2():
-    with pytest.raises(SystemExit) as stop:
-        main(args=["chart", "problems/chart.toml", "--points", "5", "-o", "x" * 300 + ".npz"], prog_name="tmsopt")
-    assert stop.value.code == 2
-
-
-def test_help_shows_examples(run):
-    for command in ("trace", "chart"):
-        status, out, _ = run(command, "--help")
-        assert status == 0
-        assert f"tmsopt {command} problems/" in out
-        assert "Exit status" in out
-
-
-@pytest.mark.parametrize("points", [(1, 5), (0, 5), 50, (5,), (99_999, 99_999), ("a", 5)])
-def test_other_numbers_of_points_are_refused(points):
-    problem = load("problems/chart.toml")
-    with pytest.raises(InputError, match=r"points: found .* accepted: two whole numbers"):
-        chart(problem, points=points, boundaries=False)
-
-
 def test_what_memory_has_no_room_for_is_refused():
     with pytest.raises(InputError, match=r"points: 1e\+08 designs do not fit into memory; give a folder"):
-        chart(load("problems/chart.toml"), points=(10_000, 10_000), boundaries=False)
+        plain((10_000, 10_000))
 
 
-def test_axes_as_one_text_are_refused():
-    problem = load("problems/chart.toml")
-    with pytest.raises(InputError, match="found 'Fr,lambda_s'; accepted: Fr and lambda_s"):
-        chart(problem, "Fr,lambda_s", points=(5, 5), boundaries=False)
+def plain(points, **changes):
+    """The chart of problems/chart.toml with changes, without boundaries."""
+    return chart(dataclasses.replace(load("problems/chart.toml"), **changes), points=points, boundaries=False)
 
 
 def test_the_least_abscissa_satisfies_the_constraints():
-    problem = load("problems/chart.toml")
-    free = chart(problem, points=(40, 30), boundaries=False)
+    free = plain((40, 30))
     best = free.to_json()["least_abscissa"]
-    bounded = dataclasses.replace(problem, constraints={"slow": f"Fr <= {best['Fr'] / 2}"})
-    found = chart(bounded, points=(40, 30), boundaries=False)
+    found = plain((40, 30), constraints={"slow": f"Fr <= {best['Fr'] / 2}"})
     allowed = found.grid[0] <= best["Fr"] / 2
     assert found.to_json()["least_abscissa"]["value"] == free.abscissa[:, allowed].min()
-    never = chart(dataclasses.replace(problem, constraints={"never": "Fr >= 100"}), points=(5, 5), boundaries=False)
+    never = plain((5, 5), constraints={"never": "Fr >= 100"})
     assert never.to_json()["least_abscissa"] is None
     assert "least abscissa" not in never.report()
 
 
 def test_an_equality_is_left_aside_and_said_to_be():
-    problem = dataclasses.replace(load("problems/chart.toml"), constraints={"law": "Fr == 2"})
-    found = chart(problem, points=(5, 5), boundaries=False)
+    found = plain((5, 5), constraints={"law": "Fr == 2"})
     assert found.left_aside == ("law",)
     assert found.satisfied.all()
     assert "law is an equality" in found.report()
 
 
 def test_the_margin_is_the_difference_of_the_sides():
-    problem = dataclasses.replace(
-        load("problems/chart.toml"), constraints={"slow": "Fr <= 2", "steep": "lambda_s >= 0.3"}
-    )
-    found = chart(problem, points=(12, 9), boundaries=False)
+    found = plain((12, 9), constraints={"slow": "Fr <= 2", "steep": "lambda_s >= 0.3"})
     Fr, tilt = np.meshgrid(*found.grid)
     assert np.array_equal(found.margin, np.minimum(2 - Fr, tilt - 0.3))
     assert np.array_equal(found.satisfied, (Fr <= 2) & (tilt >= 0.3))
@@ -456,5 +369,4 @@ def test_the_margin_is_the_difference_of_the_sides():
 
 def test_a_huge_box_is_charted_without_a_warning():
     problem = dataclasses.replace(load("problems/chart.toml"), free={"Fr": (0.1, 1e50), "lambda_s": (0.01, 1.4)})
-    found = chart(problem, points=(20, 15))
-    assert found.shares["undefined"] == 0  # Fr² is a double
+    assert chart(problem, points=(20, 15)).shares["undefined"] == 0  # Fr² is a double

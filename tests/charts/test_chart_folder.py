@@ -32,6 +32,12 @@ def whole(tmp_path_factory):
     return charted(tmp_path_factory.mktemp("whole") / "whole.chart")
 
 
+@pytest.fixture
+def small(tmp_path):
+    """The folder of a chart of 20 designs."""
+    return charted(tmp_path / "a.chart", points=(5, 4)).path
+
+
 # Killed and resumed
 
 
@@ -182,128 +188,112 @@ def test_another_chart_of_that_name_is_refused(change, words, whole):
     assert files(whole.path) == before
 
 
-def test_fresh_moves_the_old_one_aside(tmp_path):
-    path = tmp_path / "a.chart"
-    old = files(charted(path).path)
-    new = charted(path, points=(5, 4), fresh=True)
-    assert new.layers["kind"].shape == (4, 5)
-    assert files(tmp_path / "a.1.chart") == old
-    charted(path, points=(6, 4), fresh=True)
-    assert open_chart(tmp_path / "a.2.chart").layers["kind"].shape == (4, 5)
+def test_fresh_moves_the_old_one_aside(small):
+    old = files(small)
+    new = charted(small, points=(6, 4), fresh=True)
+    assert new.layers["kind"].shape == (4, 6)
+    assert files(small.with_name("a.1.chart")) == old
+    charted(small, points=(7, 4), fresh=True)
+    assert open_chart(small.with_name("a.2.chart")).layers["kind"].shape == (4, 6)
 
 
-def test_one_process_writes_at_a_time(tmp_path):
-    path = charted(tmp_path / "a.chart", points=(5, 4)).path
+def test_one_process_writes_at_a_time(small):
     tried = []
     for fresh in (False, True):
 
         def write(told, fresh=fresh):
             if told.most == 20:
                 with pytest.raises(InputError, match="written by another process"):
-                    charted(path, points=(5, 4), fresh=fresh)
+                    charted(small, points=(5, 4), fresh=fresh)
                 tried.append(fresh)
 
-        charted(path, points=(5, 4), progress=write)
+        charted(small, points=(5, 4), progress=write)
     assert set(tried) == {False, True}
-    assert [p.name for p in tmp_path.iterdir()] == ["a.chart"]
+    assert [*small.parent.iterdir()] == [small]
 
 
 def _cut(name, size):
     return lambda p: (p / name).write_bytes((p / name).read_bytes()[:size])
 
 
-def _said(**changes):
-    def change(path):
-        about = json.loads((path / "about.json").read_text())
-        (path / "about.json").write_text(json.dumps(about | changes))
-
-    return change
-
-
 def _written(name, content):
     return lambda p: (p / name).write_bytes(content)
 
 
-def _constrained(text):
+def _said(name, **changes):
+    """JSON of one line or more with other values."""
+
     def change(path):
-        about = json.loads((path / "about.json").read_text())
-        about["problem"]["constraints"]["trail"] = text
-        (path / "about.json").write_text(json.dumps(about))
+        data = json.loads((path / name).read_text()) | changes
+        (path / name).write_text(json.dumps(data) + "\n")
 
     return change
 
 
-def _told(**changes):
-    def change(path):
-        line = json.loads((path / "tiles.jsonl").read_text())
-        (path / "tiles.jsonl").write_text(json.dumps(line | changes) + "\n")
-
-    return change
+def _gone(name):
+    return lambda p: (p / name).unlink()
 
 
+BROKEN = {"model": "tms", "fixed": dict(PLANE.fixed), "constraints": {"trail": "Fr <= <= 2"}}
 DAMAGE = {
-    "no about": (lambda p: (p / "about.json").unlink(), "about.json"),
+    "no about": (_gone("about.json"), "about.json"),
     "no JSON": (_cut("about.json", 50), "about.json"),
-    "another schema": (_said(schema=7), "schema"),
+    "another schema": (_said("about.json", schema=7), "schema"),
     "no list": (_written("about.json", b"[]"), "about.json"),
-    "nothing said": (_said(title=None), "title"),
-    "a head in about": (_said(title="\x1b[31m"), "title"),
-    "layers that are none": (_said(layers=["kind"]), "layers"),
-    "a layer elsewhere": (_said(layers={"../../kind": {"dtype": "|i1"}}), "layers"),
-    "a layer of objects": (_said(layers={"kind": {"dtype": "|O"}}), "layers/kind.npy"),
-    "a tile of nothing": (_said(tile=0), "tile"),
-    "axes without an end": (_said(axes={"Fr": {"min": 0.0}, "mu": {}}), "axes.Fr.max"),
-    "a constraint that is none": (_constrained("Fr <= <= 2"), "trail"),
+    "nothing said": (_said("about.json", title=None), "title"),
+    "a head in about": (_said("about.json", title="\x1b[31m"), "title"),
+    "layers that are none": (_said("about.json", layers=["kind"]), "layers"),
+    "a layer elsewhere": (_said("about.json", layers={"../../kind": {"dtype": "|i1"}}), "layers"),
+    "a layer of objects": (_said("about.json", layers={"kind": {"dtype": "|O"}}), "layers/kind.npy"),
+    "a tile of nothing": (_said("about.json", tile=0), "tile"),
+    "axes without an end": (_said("about.json", axes={"Fr": {"min": 0.0}, "mu": {}}), "axes.Fr.max"),
+    "a constraint that is none": (_said("about.json", problem=BROKEN), "trail"),
     "nested": (_written("about.json", b"[" * 100_000 + b"]" * 100_000), "more than 100 deep"),
     "a long about": (_written("about.json", b"[" + b"0," * 9_000_000 + b"0]"), "larger than 16000000 bytes"),
-    "no layer": (lambda p: (p / "layers" / "kind.npy").unlink(), "layers/kind.npy"),
+    "no layer": (_gone("layers/kind.npy"), "layers/kind.npy"),
     "a short layer": (_cut("layers/abscissa.npy", 200), "layers/abscissa.npy"),
     "an empty layer": (_cut("layers/abscissa.npy", 0), "layers/abscissa.npy"),
     "another layer": (lambda p: np.save(p / "layers" / "kind.npy", np.zeros((4, 5))), "shape (4, 5) and type |i1"),
     "a pickle": (_written("layers/kind.npy", b"cposix\nsystem\n(S'true'\ntR."), "layers/kind.npy"),
     "a pickle in an array": (lambda p: np.save(p / "layers" / "kind.npy", np.array([{}])), "layers/kind.npy"),
-    "no record": (lambda p: (p / "tiles.jsonl").unlink(), "tiles.jsonl"),
+    "no record": (_gone("tiles.jsonl"), "tiles.jsonl"),
     "another record": (_written("tiles.jsonl", b'{"row": 0}\n{}\n'), "tiles.jsonl"),
-    "a record of another grid": (_told(designs=9), "tiles.jsonl"),
-    "a tile's classes as texts": (_told(classes=["x"] * 5), "tiles.jsonl"),
-    "a tile of another row": (_told(row=3), "tiles.jsonl"),
-    "a least one elsewhere": (_told(place=10**9), "tiles.jsonl"),
+    "a record of another grid": (_said("tiles.jsonl", designs=9), "tiles.jsonl"),
+    "a tile's classes as texts": (_said("tiles.jsonl", classes=["x"] * 5), "tiles.jsonl"),
+    "a tile of another row": (_said("tiles.jsonl", row=3), "tiles.jsonl"),
+    "a least one elsewhere": (_said("tiles.jsonl", place=10**9), "tiles.jsonl"),
     "a record without an end": (_written("tiles.jsonl", bytes(10**7)), "tiles.jsonl"),
     "no folder": (lambda p: p.rename(p.with_name("moved")), "is no chart"),
 }
 
 
 @pytest.mark.parametrize("name", DAMAGE)
-def test_damage_is_seen_and_said(name, tmp_path):
-    path = charted(tmp_path / "a.chart", points=(5, 4)).path
+def test_damage_is_seen_and_said(name, small):
     damage, words = DAMAGE[name]
-    damage(path)
+    damage(small)
     with pytest.raises(InputError) as seen:
-        open_chart(path)
+        open_chart(small)
     assert words in str(seen.value)
-    if path.exists():
-        assert charted(path, points=(5, 4), fresh=True).counts.designs == 20
+    if small.exists():
+        assert charted(small, points=(5, 4), fresh=True).counts.designs == 20
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links and pipes of POSIX")
 @pytest.mark.parametrize("make", ["link", "loop", "pipe"])
 @pytest.mark.parametrize("name", ["about.json", "tiles.jsonl", "layers", "layers/kind.npy"])
-def test_nothing_is_written_through_a_link(name, make, tmp_path):
+def test_nothing_is_written_through_a_link(name, make, small):
     """Of a folder that is begun: what the link leads to stays as it is, and the link is named."""
-    path = charted(tmp_path / "a.chart", points=(5, 4)).path
-    place, kept = path / name, tmp_path / "elsewhere"
-    (path / "tiles.jsonl").write_bytes(b"")
-    place.rename(kept)
-    if make == "link":
-        place.symlink_to(kept)
-    elif make == "loop":
-        place.symlink_to(place.name)
-    else:
+    (small / "tiles.jsonl").write_bytes(b"")
+    place = small / name
+    kept = place.rename(small.with_name("elsewhere"))
+    if make == "pipe":
         os.mkfifo(place)
+    else:
+        place.symlink_to(kept if make == "link" else place.name)
     before = {p: p.read_bytes() for p in (kept, *kept.rglob("*")) if p.is_file()}
     with pytest.raises(InputError, match=r"a\.chart"):
-        charted(path, points=(5, 4))
-    assert {p: p.read_bytes() for p in (kept, *kept.rglob("*")) if p.is_file()} == before
+        charted(small, points=(5, 4))
+    assert {p: p.read_bytes() for p in before} == before
 
 
 def test_a_folder_that_is_no_chart_is_left_alone(tmp_path):
@@ -325,8 +315,11 @@ def test_no_chart_has_more_tiles_than_are_read(tmp_path):
         ({"points": (5.9, 5)}, "accepted: two whole numbers"),
         ({"points": (5, 1)}, "each from 2 to 1000000"),
         ({"points": (10**5, 10**5)}, "1e+09 or less"),
+        ({"points": (0, 5)}, "each from 2 to 1000000"),
+        ({"points": ("a", 5)}, "accepted: two whole numbers"),
         ({"points": 7}, "found 7"),
         ({"axes": ("Fr", "mu")}, "accepted: Fr and lambda_s"),
+        ({"axes": "Fr,lambda_s"}, "found 'Fr,lambda_s'; accepted: Fr and lambda_s"),
         ({"layers": ("kinds",)}, "did you mean 'kind'?"),
         ({"layers": (), "quantities": {}}, "found none"),
         ({"quantities": {"x": "Frr"}}, "quantities.x: 'Frr' uses the unknown name"),
@@ -430,25 +423,24 @@ def test_three_axes_in_one_file(ending, tmp_path, run):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["problems/realistic.toml"], "two or three free parameters"),
-        (["problems/chart.toml", "--points", "4x4x4"], "accepted: two whole numbers"),
-        (["problems/chart.toml", "--points", "4x4x4x4"], "accepted: two whole numbers"),
-        (["problems/chart.toml", "--points", "10000x10000"], "give a folder x.chart"),
-        (["problems/chart.toml", "--quantity", "Fr*2"], "accepted: NAME=VALUE"),
-        (["problems/chart.toml", "--quantity", "x=Frr"], "unknown name 'Frr'"),
-        (["problems/chart.toml", "--layers", "kind,gamma"], "found 'gamma'; accepted: kind"),
-        (["problems/chart.toml", "--layer", "colour"], "--layer: found 'colour'; accepted: kind"),
-        (["problems/chart.toml", "--workers", "0"], "--workers"),
-        (["problems/chart.toml", "--slice", "Fr=1"], "nothing to hold"),
-        (["problems/ep_set.toml", "--plot", "x.png"], "hold one, as in --slice"),
-        (["problems/ep_set.toml", "--slice", "mu=1", "--plot", "x.png"], "--slice: found 'mu'"),
-        (["problems/ep_set.toml", "--slice", "Fr=99", "--plot", "x.png"], "--slice.Fr: found 99; accepted: "),
-        (["problems/ep_set.toml", "--slice", "Fr=fast", "--plot", "x.png"], "--slice.Fr: found 'fast'"),
-        (["problems/ep_set.toml", "--axes", "Fr,mu"], "accepted: Fr and chi_B and lambda_s"),
-        (["problems/chart.toml", "-o", "no/such/x.chart"], "does not exist"),
+        ("problems/realistic.toml", "two or three free parameters"),
+        ("problems/chart.toml --points 4x4x4", "accepted: two whole numbers"),
+        ("problems/chart.toml --points 10000x10000", "give a folder x.chart"),
+        ("problems/chart.toml --quantity Fr*2", "accepted: NAME=VALUE"),
+        ("problems/chart.toml --quantity x=Frr", "unknown name 'Frr'"),
+        ("problems/chart.toml --layers kind,gamma", "found 'gamma'; accepted: kind"),
+        ("problems/chart.toml --layer colour", "--layer: found 'colour'; accepted: kind"),
+        ("problems/chart.toml --workers 0", "--workers"),
+        ("problems/chart.toml --slice Fr=1", "nothing to hold"),
+        ("problems/ep_set.toml --plot x.png", "hold one, as in --slice"),
+        ("problems/ep_set.toml --slice mu=1 --plot x.png", "--slice: found 'mu'"),
+        ("problems/ep_set.toml --slice Fr=99 --plot x.png", "--slice.Fr: found 99; accepted: "),
+        ("problems/ep_set.toml --slice Fr=fast --plot x.png", "--slice.Fr: found 'fast'"),
+        ("problems/ep_set.toml --axes Fr,mu", "accepted: Fr and chi_B and lambda_s"),
+        ("problems/chart.toml -o no/such/x.chart", "does not exist"),
     ],
 )
 def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, run):
-    status, out, err = run("chart", *arguments)
+    status, out, err = run("chart", *arguments.split())
     assert (status, out) == (2, "")
     assert words in " ".join(err.split())

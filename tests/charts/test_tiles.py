@@ -10,7 +10,7 @@ from helpers.charts import EXTRA, FIXED, PLANE, POINTS, SPACE, charted, files
 from tmsopt.charts import LAYERS, Grid, add_tallies, chart, count_tile, open_chart, plan_survey
 from tmsopt.errors import InputError
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity
-from tmsopt.problem import Problem, array_function, load
+from tmsopt.problem import Problem, array_function
 from tmsopt.roots import CLASSES
 
 
@@ -75,13 +75,12 @@ def test_three_axes_are_planes_one_above_the_other(tmp_path):
 
 def test_a_grid_knows_its_designs():
     grid = Grid(("x", "y", "z"), (np.arange(4.0), np.arange(10, 13.0), np.arange(20, 22.0)))
-    z, y, x = np.meshgrid(*grid.values[::-1], indexing="ij")
-    assert grid.shape == x.shape == (2, 3, 4)
-    up = grid.columns(range(1, 5))
-    assert np.array_equal(up["x"], grid.values[:1])
-    assert np.array_equal(up["y"][:, 0], y.reshape(6, 4)[1:5, 0])
-    assert np.array_equal(up["z"][:, 0], z.reshape(6, 4)[1:5, 0])
-    assert grid.design(17) == {"x": x.flat[17], "y": y.flat[17], "z": z.flat[17]}
+    arrays = dict(zip("zyx", np.meshgrid(*grid.values[::-1], indexing="ij"), strict=True))
+    assert grid.shape == arrays["x"].shape == (2, 3, 4)
+    rows = grid.columns(range(1, 5))
+    for name, array in arrays.items():
+        assert np.array_equal(np.broadcast_to(rows[name], (4, 4)), array.reshape(6, 4)[1:5])
+    assert grid.design(17) == {name: array.flat[17] for name, array in arrays.items()}
     assert [r for tile in grid.tiles(9) for r in tile] == list(range(6))
 
 
@@ -106,17 +105,17 @@ def test_only_what_is_asked_for_is_kept(tmp_path):
 
 def test_counts_are_those_of_the_arrays():
     rng = np.random.default_rng(0)
-    layers = {"kind": rng.integers(0, 5, (6, 10)).astype(np.int8), "satisfied": rng.random((6, 10)) < 0.5}
-    layers["abscissa"] = rng.normal(size=(6, 10)).round(1)
-    layers["abscissa"][2] = np.nan
+    kind, satisfied = rng.integers(0, 5, (6, 10)).astype(np.int8), rng.random((6, 10)) < 0.5
+    abscissa = rng.normal(size=(6, 10)).round(1)
+    abscissa[2] = np.nan
+    layers = {"kind": kind, "satisfied": satisfied, "abscissa": abscissa}
     parts = [count_tile({n: a[k : k + 2] for n, a in layers.items()}, 10 * k, 1) for k in (4, 0, 2)]
     found = add_tallies(parts)
-    allowed = np.where(layers["satisfied"], layers["abscissa"], np.nan)
+    allowed = np.where(satisfied, abscissa, np.nan)
     assert (found.least, found.place) == (np.nanmin(allowed), np.nanargmin(allowed))
-    assert found.shares == {n: np.mean(layers["kind"] == k) for k, n in enumerate(CLASSES)}
-    assert (found.satisfied, found.designs, found.fallbacks) == (layers["satisfied"].sum(), 60, 3)
-    none = count_tile({"abscissa": np.full((2, 2), np.nan)}, 0)
-    assert none.place == -1
+    assert found.shares == {n: np.mean(kind == k) for k, n in enumerate(CLASSES)}
+    assert (found.satisfied, found.designs, found.fallbacks) == (satisfied.sum(), 60, 3)
+    assert count_tile({"abscissa": np.full((2, 2), np.nan)}, 0).place == -1
 
 
 OSCILLATOR = Model(
@@ -181,11 +180,3 @@ def test_a_worker_that_crashes_ends_the_chart(tmp_path):
         charted(path, problem, points=(4, 6), tile=4, workers=2, quantities={"x": "fatal"})
     with pytest.raises(InputError, match="not finished"):
         open_chart(path)
-
-
-def test_one_or_four_free_parameters_make_no_grid():
-    for problem in (load("problems/chart.toml"), SPACE):
-        assert plan_survey(problem, points=(3,) * len(problem.free)).grid.size == 3 ** len(problem.free)
-    line = dataclasses.replace(PLANE, fixed=PLANE.fixed | {"Fr": 2.0}, free={"lambda_s": (0.1, 1.0)})
-    with pytest.raises(InputError, match="two or three free parameters, and 1 are free"):
-        plan_survey(line, points=(3,))

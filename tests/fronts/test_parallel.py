@@ -17,7 +17,6 @@ curve = import_module("tmsopt.fronts.curve")
 options = import_module("tmsopt.program.options")
 pareto = import_module("tmsopt.fronts.pareto")
 subproblems = import_module("tmsopt.fronts.subproblems")
-parallel = import_module("tmsopt.fronts.parallel")
 
 FIXED = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 FREE = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (0.035, 1.4)}
@@ -26,7 +25,7 @@ ASK = subproblems.FrontSolver(PROBLEM, options.Options())
 
 
 def map_items(function, items, workers):
-    return dict(parallel.map_items(workers, function, ASK, items))
+    return dict(subproblems.map_items(workers, function, ASK, items))
 
 
 @pytest.mark.slow
@@ -52,15 +51,15 @@ def test_an_item_that_ends_its_processes_is_an_error():
 
 
 def test_what_cannot_be_sent_is_solved_here():
-    assert parallel.can_pickle(ASK)
-    assert not parallel.can_pickle(replace(ASK, single_optima={0: threading.Lock()}))
+    assert subproblems.can_pickle(ASK)
+    assert not subproblems.can_pickle(replace(ASK, single_optima={0: threading.Lock()}))
 
 
 def test_what_was_done_before_an_interrupt_is_kept_and_the_team_can_go_on():
     with here() as side_by_side:
         found = []
         with pytest.raises(KeyboardInterrupt):
-            found.extend(parallel.map_items(side_by_side, shares.interrupted_at_two, ASK, range(4)))
+            found.extend(subproblems.map_items(side_by_side, shares.interrupted_at_two, ASK, range(4)))
         assert found == [(0, 0), (1, 1)]
         assert map_items(shares.squared, [3], side_by_side) == {0: (9, os.getpid())}
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from tmsopt.charts.export import make_dataset, save_layers
 from tmsopt.charts.folder import SCHEMA, Tiles, grid_of, read_folder, write_folder
-from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, layer_faults, limits_of, plan_survey
-from tmsopt.charts.tally import Tally, add_tallies
+from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, Tally, add_tallies, layer_faults, limits_of, plan_survey
 from tmsopt.deprecated import ignore_option
 from tmsopt.errors import InputError, call_faults, count_faults, input_error
 from tmsopt.executor import Crash, here, processes
@@ -219,17 +218,16 @@ def chart(
 
     More: docs/how_to/charts.md
     """
-    faults = [*count_faults("workers", workers, 1, _MOST_WORKERS), *count_faults("tile", tile, 1)]
+    faults = count_faults("workers", workers, 1, _MOST_WORKERS) + count_faults("tile", tile, 1)
     if faults := faults + call_faults("progress", progress):
         raise InputError(faults)
-    steps = start_steps(progress, "charting", "design")
+    steps = start_steps(progress, "charting", "design") or (lambda *_: None)
     wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
     work = plan_survey(problem, axes, points, wanted, quantities, single)
-    path, grid = None if folder is None else as_path(folder, "a folder"), work.grid
+    path, grid, about = None if folder is None else as_path(folder, "a folder"), work.grid, _describe(work, tile)
     if path is None and grid.size > LARGEST:
         message = f"{grid.size:.3g} designs do not fit into memory; give a folder x.chart, or at most {LARGEST:.0e}"
         raise input_error(message, "points")
-    about = _describe(work, tile)
     grid.tiles(tile)  # raises for too many tiles
     memory = {} if path else {n: np.empty(grid.shape, dtype) for n, dtype in work.dtypes.items()}
     where = write_folder(path, about, grid, fresh) if path else nullcontext(Tiles(memory, tile))
@@ -237,21 +235,17 @@ def chart(
         began = time.perf_counter()
         remaining = [rows for rows in grid.tiles(target.tile) if rows.start not in target.done]
         done = before = add_tallies(target.done.values()).designs
-        if steps:
-            steps(done, grid.size)
+        steps(done, grid.size)
         for place, found in executor.map(work.compute, remaining):
             if isinstance(found, Crash):
                 cause = f"a worker that computed {tile} designs crashed ({found.cause})"
-                message = f"{cause}; give fewer workers or a smaller tile"
-                raise input_error(message, "workers")
+                raise input_error(f"{cause}; give fewer workers or a smaller tile", "workers")
             target.write(remaining[place], *found)
             done += found[1].designs
-            if steps:
-                steps(done, grid.size)
-    seconds = time.perf_counter() - began
+            steps(done, grid.size)
+    seconds, new = time.perf_counter() - began, done - before
     for layer in memory.values():
         layer.flags.writeable = False
-    new = done - before
     run = {"engine": "numpy", **({"designs": new} if path else {}), "seconds": seconds, "per_second": new / seconds}
     charted = work.problem.problem
     edges = domain(charted, progress=progress) if boundaries and len(grid.axes) == 2 else None

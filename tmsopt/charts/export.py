@@ -32,11 +32,11 @@ def save_layers(problem: Posed, grid: Grid, layers: Layers, path: Path) -> None:
             dataset.to_netcdf(place)
         return
     axes = _name_axes(grid, layers)
-    about: dict[str, Any] = {"title": problem.title, "model": problem.model.name, "fixed": dict(problem.fixed)}
+    about = {"title": problem.title, "model": problem.model.name, "fixed": dict(problem.fixed)}
     about |= {"dimensions": axes[::-1], "classes": CLASSES}
     if problem.model.statement is not None:
         about["statement"] = dict(problem.model.statement)
-    arrays: dict[str, Any] = {**dict(zip(axes, grid.values, strict=True)), **layers}
+    arrays: dict[str, Any] = dict(zip(axes, grid.values, strict=True)) | dict(layers)
     with write_atomic(path) as place, place.open("wb") as stream:
         np.savez_compressed(stream, about=np.array(json.dumps(about)), **arrays)
 

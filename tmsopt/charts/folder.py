@@ -11,7 +11,6 @@ A tile is recorded after its numbers are on the disk, so the record is right whe
 
 import errno
 import json
-import math
 import os
 import shutil
 import time
@@ -19,7 +18,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from tokenize import TokenError
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -27,8 +25,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
-from tmsopt.charts.survey import LONGEST, MOST, MOST_TILES, Grid
-from tmsopt.charts.tally import Tally
+from tmsopt.charts.survey import LONGEST, MOST, MOST_TILES, Grid, Tally
 from tmsopt.errors import InputError, input_error
 from tmsopt.files import from_json, list_differences, move_aside, read_lines, read_text, write_text
 from tmsopt.models import MODELS
@@ -36,8 +33,6 @@ from tmsopt.problem.problem import Problem
 
 SCHEMA = 1
 
-# Exceptions from reading a damaged folder; a link to itself is a RuntimeError.
-_DAMAGE = (OSError, RuntimeError, ValueError, LookupError, TypeError, OverflowError, TokenError)
 _ABOUT, _TILES, _LOCK = "about.json", "tiles.jsonl", "chart.lock"
 _LONG_ABOUT, _LONG_LINE = 16_000_000, 10_000  # bytes
 _SYNC = 1.0  # seconds between records of finished tiles
@@ -53,13 +48,15 @@ class Tiles:
         layers: arrays, or memory maps; these are written as files, so that a full disk raises an error.
         tile: designs of a tile.
         done: first row → counts of a finished tile.
-        record: file of finished tiles, for memory maps, and where its last whole line ends.
+        record: file of finished tiles, for memory maps.
+        end: where its last whole line ends.
     """
 
     layers: Layers
     tile: int
     done: dict[int, Tally] = field(default_factory=dict)
-    record: tuple[Path, int] | None = None
+    record: Path | None = None
+    end: int = 0
     _waiting: bytes = b""
     _synced: float = field(default_factory=time.monotonic)
 
@@ -74,9 +71,8 @@ class Tiles:
             else:
                 layer.reshape(-1, layer.shape[-1])[rows.start : rows.stop] = array
         self.done[rows.start] = counts
-        least = counts.least if counts.place >= 0 else None
-        line = {"row": rows.start, "rows": len(rows), **asdict(counts), "least": least}
-        self._waiting += f"{json.dumps(line)}\n".encode()
+        least = counts.least if counts.place >= 0 else None  # JSON has no nan
+        self._waiting += f"{json.dumps({'row': rows.start, **asdict(counts), 'least': least})}\n".encode()
         if time.monotonic() - self._synced > _SYNC:
             self.sync()
 
@@ -84,17 +80,16 @@ class Tiles:
         """Flush all layers to the disk, then record the tiles."""
         if self.record is None or not self._waiting:
             return
-        path, end = self.record
         for name in self.layers:
-            with (path.parent / _layer_path(name)).open("r+b") as stream:
+            with (self.record.parent / _layer_path(name)).open("r+b") as stream:
                 os.fsync(stream.fileno())
-        with path.open("r+b") as stream:
-            stream.seek(end)
-            stream.truncate()
+        with self.record.open("r+b") as stream:
+            stream.truncate(self.end)
+            stream.seek(self.end)
             stream.write(self._waiting)
             stream.flush()
             os.fsync(stream.fileno())
-        self.record = path, end + len(self._waiting)
+        self.end += len(self._waiting)
         self._waiting, self._synced = b"", time.monotonic()
 
 
@@ -109,10 +104,11 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
     Raises:
         InputError: for a damaged folder, another chart, or a folder that another process writes; if the disk is full.
     """
-    if fresh and os.path.lexists(path):
-        with _lock_folder(path):
-            move_aside(path)
+    lock = FileLock(path / _LOCK, timeout=0)
     with _refuse_write_errors(path):
+        if fresh and os.path.lexists(path):
+            with lock:
+                move_aside(path)
         if not path.exists():
             each = sum(np.dtype(layer["dtype"]).itemsize for layer in about["layers"].values())
             needed, free = each * grid.size, shutil.disk_usage(path.parent).free
@@ -121,9 +117,11 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
             path.mkdir()
         elif not any((path / n).exists() for n in (_ABOUT, _LOCK)):
             raise _make_no_chart_error(path)
-    with _lock_folder(path):
+        held = lock.acquire()
+    with held:
         if not os.path.lexists(path / _ABOUT):
-            _create(path, about, grid)
+            with _refuse_write_errors(path):
+                _create(path, about, grid)
         existing, _, tiles = read_folder(path)
         ignored = {"versions": None, "tile": None}
         if changed := list(list_differences(existing | ignored, about | ignored)):
@@ -136,21 +134,12 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
 
 
 @contextmanager
-def _lock_folder(path: Path) -> Iterator[None]:
-    with _refuse_write_errors(path):
-        try:
-            lock = FileLock(path / _LOCK, timeout=0).acquire()
-        except Timeout:
-            message = f"'{path}' is being written by another process; wait for it, or give another name"
-            raise input_error(message, "--output") from None
-    with lock:
-        yield
-
-
-@contextmanager
 def _refuse_write_errors(path: Path) -> Iterator[None]:
     try:
         yield
+    except Timeout:
+        message = f"'{path}' is being written by another process; wait for it, or give another name"
+        raise input_error(message, "--output") from None
     except OSError as error:
         raise input_error(f"'{path}' cannot be written: {error.strerror or error}", "--output") from None
 
@@ -165,16 +154,15 @@ def _make_no_chart_error(path: Path) -> InputError:
 
 def _create(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
     """Create the files of a new chart, about.json last: without it the next run starts anew."""
-    with _refuse_write_errors(path):
-        for part in ("axes", "layers"):
-            shutil.rmtree(path / part, ignore_errors=True)  # left by a killed process
-            (path / part).mkdir()
-        for name, values in zip(grid.axes, grid.values, strict=True):
-            np.save(path / "axes" / f"{name}.npy", values)
-        for name, layer in about["layers"].items():
-            np.lib.format.open_memmap(path / _layer_path(name), "w+", np.dtype(layer["dtype"]), grid.shape)
-        (path / _TILES).touch()
-        write_text(path / _ABOUT, json.dumps(about, indent=2, ensure_ascii=False))
+    for part in ("axes", "layers"):
+        shutil.rmtree(path / part, ignore_errors=True)  # left by a killed process
+        (path / part).mkdir()
+    for name, values in zip(grid.axes, grid.values, strict=True):
+        np.save(path / "axes" / f"{name}.npy", values)
+    for name, layer in about["layers"].items():
+        np.lib.format.open_memmap(path / _layer_path(name), "w+", np.dtype(layer["dtype"]), grid.shape)
+    (path / _TILES).touch()
+    write_text(path / _ABOUT, json.dumps(about, indent=2, ensure_ascii=False))
 
 
 # Reading
@@ -224,16 +212,18 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
             raise ValueError(f"more than {MOST:.0e} designs")
         for layer, stated in about["layers"].items():
             name = _layer_path(layer)
-            layers[layer] = _read_layer(_find_file(path, name), grid.shape, stated.get("dtype"))
+            layers[layer] = array = np.lib.format.open_memmap(_find_file(path, name), "r")
+            if array.shape != grid.shape or array.dtype.str != stated.get("dtype") or not array.flags.c_contiguous:
+                raise ValueError(f"not an array of shape {grid.shape} and type {stated.get('dtype')}")
         name = _TILES
         record = _find_file(path, name)
         done, end = _read_record(record, about["tile"], grid)
-    except _DAMAGE as error:
+    except Exception as error:  # a damaged folder can raise anything, such as a link to itself a RuntimeError
         reason = " ".join(str(error).split())[:300]
         raise input_error(
             f"'{path}' is damaged: {name}: {reason}; give --fresh to move it aside and start anew"
         ) from None
-    return about, problem, Tiles(layers, about["tile"], done, (record, end))
+    return about, problem, Tiles(layers, about["tile"], done, record, end)
 
 
 def grid_of(about: Mapping[str, Any]) -> Grid:
@@ -259,13 +249,6 @@ def _find_file(path: Path, name: str) -> Path:
     return place
 
 
-def _read_layer(place: Path, shape: tuple[int, ...], dtype: str | None) -> NDArray[Any]:
-    layer = np.lib.format.open_memmap(place, "r")
-    if layer.shape != shape or layer.dtype.str != dtype or not layer.flags.c_contiguous:
-        raise ValueError(f"not an array of shape {shape} and type {dtype}")
-    return layer
-
-
 def _read_record(place: Path, tile: int, grid: Grid) -> tuple[dict[int, Tally], int]:
     """First row → counts of each recorded tile; and where the last whole line ends."""
     done, end = dict[int, Tally](), 0
@@ -274,9 +257,7 @@ def _read_record(place: Path, tile: int, grid: Grid) -> tuple[dict[int, Tally], 
         if not line.endswith("\n"):
             break  # cut off while it was written
         end += len(line)
-        entry = from_json(line)
-        if entry["least"] is None:
-            entry["least"] = math.nan
+        entry = {n: x for n, x in from_json(line).items() if x is not None}
         row, counts = entry["row"], _TALLY.validate_python(entry)
         if counts.designs != len(tiles.get(row, ())) * grid.shape[-1] or not -1 <= counts.place < grid.size:
             raise ValueError(f"{line:.100} is no tile")

@@ -1,8 +1,8 @@
-"""Grids over two or three parameters, and what is computed for their designs, a few rows at a time."""
+"""Grids over two or three parameters; what is computed for their designs, a few rows at a time, and counted."""
 
 import math
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any
@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from tmsopt.charts.tally import Tally, count_tile
 from tmsopt.errors import Fault, InputError, input_error, list_faults, short, suggest, table_faults
 from tmsopt.problem.advice.names import example_of
 from tmsopt.problem.evaluate import ArrayFunction, array_function, parse_all
@@ -18,7 +17,7 @@ from tmsopt.problem.files import Given, pose
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_NAMES
 from tmsopt.records import Array
-from tmsopt.roots import classify, find_motion
+from tmsopt.roots import CLASSES, classify, find_motion
 
 LAYERS: Mapping[str, DTypeLike] = {
     "kind": np.int8,
@@ -99,6 +98,32 @@ class Grid:
 
 
 @dataclass(frozen=True)
+class Tally:
+    """Counts over some of the designs.
+
+    Attributes:
+        designs: number of designs.
+        classes: number in each class; empty without the layer ``kind``.
+        satisfied: number that satisfy every inequality; None without that layer.
+        least: least abscissa of these; nan if there is none.
+        place: its index in the flat arrays, the first of equals; -1 if there is none.
+        fallbacks: number of designs whose roots came from companion eigenvalues.
+    """
+
+    designs: int = 0
+    classes: tuple[int, ...] = ()
+    satisfied: int | None = None
+    least: float = math.nan
+    place: int = -1
+    fallbacks: int = 0
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Share of the designs in each class; empty without the layer ``kind``."""
+        return {n: count / self.designs for n, count in zip(CLASSES, self.classes, strict=False)}
+
+
+@dataclass(frozen=True)
 class Survey:
     """The layers to compute for every design of a grid.
 
@@ -117,8 +142,8 @@ class Survey:
 
     def compute(self, rows: range) -> tuple[dict[str, NDArray[Any]], Tally]:
         """The layers of a few rows, shape (len(rows), n), and their counts."""
-        model, shape = self.problem.model, (len(rows), self.grid.shape[-1])
-        columns, fallbacks, layers = {**self.problem.fixed, **self.grid.columns(rows)}, 0, self.dtypes.keys()
+        shape, layers, fallbacks = (len(rows), self.grid.shape[-1]), self.dtypes.keys(), 0
+        columns, model = {**self.problem.fixed, **self.grid.columns(rows)}, self.problem.model
         with np.errstate(all="ignore"):  # overflow counts as undefined
             values = self.before(columns)
             coefficients = [np.broadcast_to(values[n], shape) for n in model.coefficient_names()]
@@ -167,37 +192,36 @@ def plan_survey(
     names = axes_of(problem, axes)
     sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
     extra = {} if quantities is None else quantities
-    faults = layer_faults(layers, tuple(LAYERS))
-    faults += table_faults("quantities", extra, "{'wheel_load': 'load_front/2'}")
+    faults = layer_faults(layers, LAYERS) + table_faults("quantities", extra, "{'wheel_load': 'load_front/2'}")
     if not faults:
         reserved = {*LAYERS, *names, "about"}
         message = f"accepted: letters, digits and _, other than {' '.join(sorted(reserved))}"
         wrong = [n for n in extra if n in reserved or not (n.isidentifier() and n.isascii())]
-        faults += [Fault(f"found the name {n!r}; {message}", ("quantities",)) for n in wrong]
+        faults = [Fault(f"found the name {n!r}; {message}", ("quantities",)) for n in wrong]
         if not (layers or extra):
             faults.append(Fault(f"found none; accepted: some of {' '.join(LAYERS)}", ("layers",)))
     if faults:
         raise InputError(faults)
     wanted = {_QUANTITY + n: e for n, e in parse_all(problem, extra).items()}
-    if with_radius := [n for n in extra if RADIUS in wanted[_QUANTITY + n].names]:
-        message = f"found {RADIUS}, which needs a search for every design; accepted: quantities with a formula"
-        raise InputError([Fault(message, ("quantities", n)) for n in with_radius])
+    message = f"found {RADIUS}, which needs a search for every design; accepted: quantities with a formula"
+    if faults := [Fault(message, ("quantities", n)) for n in extra if RADIUS in wanted[_QUANTITY + n].names]:
+        raise InputError(faults)
     if {"satisfied", "margin"} & set(layers):
         wanted |= {_LIMIT + n: c for n, c in limits_of(problem).items()}
     wanted |= parse_all(problem, {n: n for n in problem.model.coefficient_names()})
     on_roots = {n: e for n, e in wanted.items() if set(ROOT_NAMES) & set(e.names)}
-    dtypes = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *extra)}
+    types = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *extra)}
     return Survey(
         problem,
         Grid(names, tuple(np.linspace(*problem.free[n], m) for n, m in zip(names, sizes, strict=True))),
-        {n: np.dtype(np.float32) if single and d == np.float64 else d for n, d in dtypes.items()},
+        {n: np.dtype(np.float32) if single and d == np.float64 else d for n, d in types.items()},
         dict(extra),
         before=array_function(problem, {n: e for n, e in wanted.items() if n not in on_roots}),
         after=array_function(problem, on_roots),
     )
 
 
-def layer_faults(names: Any, accepted: Sequence[str]) -> list[Fault]:
+def layer_faults(names: Any, accepted: Collection[str]) -> list[Fault]:
     """Faults in a list of layers."""
     return list_faults("layers", names, "['kind', 'abscissa']") or [
         Fault(f"found {short(n)}; {suggest(n, accepted)}", ("layers",)) for n in names if n not in accepted
@@ -231,3 +255,37 @@ def _sizes(points: Any, count: int) -> tuple[int, ...]:
         accepted = f"{number} whole numbers, each from 2 to {LONGEST}, with a product of {MOST:.0e} or less"
         raise input_error(f"found {points!r}; accepted: {accepted}", "points")
     return sizes
+
+
+def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 0) -> Tally:
+    """Count over a tile whose first design has the index `first`."""
+    kind, satisfied, abscissa = (layers.get(n) for n in ("kind", "satisfied", "abscissa"))
+    least, place = math.nan, -1
+    if abscissa is not None:
+        allowed = np.where(np.isfinite(abscissa) & (True if satisfied is None else satisfied), abscissa, np.inf)
+        best = int(allowed.argmin())
+        if allowed.flat[best] < np.inf:
+            least, place = float(allowed.flat[best]), first + best
+    return Tally(
+        next(iter(layers.values())).size,
+        () if kind is None else tuple(np.bincount(kind.ravel(), minlength=len(CLASSES)).tolist()),
+        None if satisfied is None else int(np.count_nonzero(satisfied)),
+        least,
+        place,
+        fallbacks,
+    )
+
+
+def add_tallies(tallies: Iterable[Tally]) -> Tally:
+    """Add the counts of several tiles, in any order."""
+    every = [*tallies]
+    best = min((t for t in every if t.place >= 0), key=lambda t: (t.least, t.place), default=Tally())
+    satisfied = [t.satisfied for t in every if t.satisfied is not None]
+    return Tally(
+        sum(t.designs for t in every),
+        tuple(map(sum, zip(*(t.classes for t in every), strict=True))),
+        sum(satisfied) if satisfied else None,
+        best.least,
+        best.place,
+        sum(t.fallbacks for t in every),
+    )

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import accumulate, islice, pairwise
 
 from tmsopt.executor import Executor
 from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient_points
-from tmsopt.fronts.parallel import MAX_PARALLEL, map_items
-from tmsopt.fronts.subproblems import FrontSolver, front_point, minimise_limited
+from tmsopt.fronts.subproblems import MAX_PARALLEL, FrontSolver, front_point, map_items, minimise_limited
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Steps
 from tmsopt.search.solve import add_cover
@@ -86,7 +85,7 @@ class _Stretch:
     @property
     def has_kink(self) -> bool:
         known = "undecided" not in (self.left.structure, self.right.structure)
-        return known and (self.left.structure, set(self.left.limits)) != (self.right.structure, set(self.right.limits))
+        return known and bool(list_changes(self.left, self.right))
 
     @property
     def halvings(self) -> int:
@@ -95,51 +94,59 @@ class _Stretch:
         return 0 if self.gap else max(0, math.ceil(math.log2(self.length / (_END if at_end else _KINK))))
 
 
+@dataclass
 class _Search:
-    """The probes made so far; the front is derived from them each time."""
+    """The probes made so far; the front is derived from them each time.
 
-    def __init__(self, executor: Executor, solver: FrontSolver, points: int, progress: Steps) -> None:
-        self.executor, self.solver, self.points, self.progress = executor, solver, points, progress
-        self.ends, self.range = solver.ends, solver.ranges
-        self.probes: list[_Probe] = []
-        self.steps_done, self.steps_total = 0, points
+    Attributes:
+        points: number of points asked for.
+        steps: steps done of the task at hand, and their number.
+    """
+
+    executor: Executor
+    solver: FrontSolver
+    points: int
+    progress: Steps
+    probes: list[_Probe] = field(default_factory=list)
+    steps: tuple[int, int] = (0, 0)
 
     def efficient_chain(self) -> list[FrontPoint]:
         """The efficient points found, sorted by the first objective."""
-        found = [*self.ends, *(p.point for p in self.probes if p.point is not None)]
-        return efficient_points(found, [_SAME * r for r in self.range])
+        found = [*self.solver.ends, *(p.point for p in self.probes if p.point is not None)]
+        return efficient_points(found, [_SAME * r for r in self.solver.ranges])
 
     def find_stretches(self) -> list[_Stretch]:
         return [self._find_stretch(left, right) for left, right in pairwise(self.efficient_chain())]
 
     def _find_stretch(self, left: FrontPoint, right: FrontPoint) -> _Stretch:
         a, b = left.objectives, right.objectives
-        size = tuple(abs(x - y) / span for x, y, span in zip(a, b, self.range, strict=True))
+        size = tuple(abs(x - y) / span for x, y, span in zip(a, b, self.solver.ranges, strict=True))
         own = [p for p in self.probes if self._found_nothing(p, *((b, a) if p.axis else (a, b)))]
         axis = own[0].axis if own else int(size[1] > size[0])
         low, high = sorted((a[axis], b[axis]))
-        failures = [p.eps for p in own if p.axis == axis and p.point is None]
-        empty = [p.eps for p in own if p.axis == axis and p.point is not None]
+        failures, empty = (
+            [p.eps for p in own if p.axis == axis and (p.point is None) is failed] for failed in (True, False)
+        )
         above = max(failures + empty, default=low), high
         first = min(failures, default=low)
         below = max([low, *(e for e in empty if e < first)]), first
-        unknown = below if below[1] - below[0] > _FAILED * self.range[axis] else above
+        unknown = below if below[1] - below[0] > _FAILED * self.solver.ranges[axis] else above
         enough = _FAILED if failures else _GAP
-        gap = bool(own) and unknown[1] - unknown[0] <= enough * self.range[axis]
+        gap = bool(own) and unknown[1] - unknown[0] <= enough * self.solver.ranges[axis]
         return _Stretch(left, right, size, axis, unknown, bool(own), bool(failures), gap)
 
     def _found_nothing(self, probe: _Probe, low: Objectives, high: Objectives) -> bool:
         """Whether a probe between two neighbours failed, or improved neither objective of the lower one."""
         k = probe.axis
-        margin = _UNUSED * self.range[k]
+        margin = _UNUSED * self.solver.ranges[k]
         if not low[k] + margin < probe.eps < high[k]:
             return False
         if probe.point is None:
             return True
         found = probe.point.objectives
-        if found[1 - k] > low[1 - k] + _UNUSED * self.range[1 - k]:  # a better neighbour was found later
+        if found[1 - k] > low[1 - k] + _UNUSED * self.solver.ranges[1 - k]:  # a better neighbour was found later
             return False
-        return found[k] <= low[k] + margin or found[1 - k] >= low[1 - k] - _SAME * self.range[1 - k]
+        return found[k] <= low[k] + margin or found[1 - k] >= low[1 - k] - _SAME * self.solver.ranges[1 - k]
 
     def plan_probe(self, s: _Stretch, place: int, share: float = 0.5, few_starts: bool = False) -> "_ProbeRequest":
         """A probe between two neighbours, at a share of the way from the lower one in the limited objective."""
@@ -147,7 +154,7 @@ class _Search:
         eps = low + (high - low) * (0.5 if s.suspect else share)
         near, k, known = (s.left.solution, s.right.solution), 1 - s.axis, s.right if s.axis else s.left
         quick = ((near[:1] if self._are_close(*near) else near, True),) if few_starts else ()
-        enough = known.objectives[k] + _UNUSED * self.range[k]
+        enough = known.objectives[k] + _UNUSED * self.solver.ranges[k]
         return _ProbeRequest(s.axis, eps, (*quick, (near, False)), enough, known, len(self.probes) + place)
 
     def probe(self, requests: Sequence["_ProbeRequest"]) -> list[_Probe | None]:
@@ -156,8 +163,9 @@ class _Search:
         try:
             for k, probe in map_items(self.executor, _solve_request, self.solver, requests):
                 found[k] = probe
-                self.steps_done += 1
-                self.progress(min(self.steps_done, self.steps_total), self.steps_total)
+                done, most = self.steps
+                self.steps = done + 1, most
+                self.progress(min(done + 1, most), most)
         finally:
             ended = [found.get(k) for k in range(len(requests))]
             self.probes += [probe for probe in ended if probe is not None]
@@ -175,7 +183,7 @@ class _Search:
     def add_points(self) -> None:
         """Add points where neighbours are farthest apart, until there are enough."""
         self.progress.begin("following the front", "point")
-        self.steps_done, self.steps_total = len(self.efficient_chain()), self.points
+        self.steps = len(self.efficient_chain()), self.points
         while not self.is_exhausted:
             stretches = self.find_stretches()
             open_ = sorted((s for s in stretches if not s.gap and s.length > _GAP), key=lambda s: -s.length)
@@ -190,11 +198,10 @@ class _Search:
         """Solve each point again from the design before it, in both directions; True if any improved."""
         before = len(self.efficient_chain())
         self.progress.begin("looking for better branches", "sub-problem")
-        self.steps_done, self.steps_total = 0, 2 * before
+        self.steps = 0, 2 * before
         better = False
-        for backwards in (False, True):
-            chain = self.efficient_chain()[::-1] if backwards else self.efficient_chain()
-            previous, rest = chain[0], chain[1:-1]
+        for direction in (1, -1):
+            previous, *rest, _ = self.efficient_chain()[::direction]
             while rest:  # a few in parallel, assuming none improves; if one does, those after it are solved again
                 next_requests = [*islice(self._next_requests(previous, rest), MAX_PARALLEL)]
                 new = self.probe([request for _, request in next_requests])
@@ -215,7 +222,7 @@ class _Search:
             probe = next((p for p in self.probes if p.point is old), None)
             if probe is not None and not self._are_close(previous.solution, old.solution):
                 k = 1 - probe.axis
-                enough = old.objectives[k] - _UNUSED * self.range[k]
+                enough = old.objectives[k] - _UNUSED * self.solver.ranges[k]
                 way = ((previous.solution,), True)
                 yield place, _ProbeRequest(probe.axis, probe.eps, (way,), enough, None, len(self.probes))
             previous = old
@@ -227,26 +234,23 @@ class _Search:
         uses new starts too.
         """
         self.progress.begin("placing kinks and gaps", "sub-problem")
-        self.steps_done = 0
+        self.steps = 0, 0
         while not self.is_exhausted:
             stretches = self.find_stretches()
             unclear = [s for s in stretches if not s.gap and s.suspect and s.length > _GAP]
             changing = [s for s in stretches if s.has_kink and s.halvings]
             if not (now := (unclear or changing)[:MAX_PARALLEL]):
                 break
-            self.steps_total = self.steps_done + len(unclear) + sum(s.halvings for s in changing)
+            done, _ = self.steps
+            self.steps = done, done + len(unclear) + sum(s.halvings for s in changing)
             few_starts = [not unclear and s.halvings > 1 for s in now]
             found = self.probe([self.plan_probe(s, k, few_starts=few_starts[k]) for k, s in enumerate(now)])
-            if not unclear and any(
-                not f and self._is_other_branch(p, s) for s, f, p in zip(now, few_starts, found, strict=True)
-            ):
-                return True
+            for s, few, probe in zip(now, few_starts, found, strict=True):
+                if (point := probe and probe.point) and not (unclear or few):
+                    ends = s.left.solution, s.right.solution
+                    if not any(self._are_close(point.solution, end) for end in ends):
+                        return True
         return False
-
-    def _is_other_branch(self, probe: _Probe | None, s: _Stretch) -> bool:
-        """Whether a probe found a design close to neither neighbour."""
-        found = probe.point if probe else None
-        return found is not None and not any(self._are_close(found.solution, end.solution) for end in (s.left, s.right))
 
 
 @dataclass(frozen=True)
@@ -286,11 +290,9 @@ def _assemble_front(search: _Search, front: Front) -> Front:
     """The front as reported: all labelled points, and the others where they are not crowded."""
     stretches = search.find_stretches()
     chain = [stretches[0].left, *(s.right for s in stretches)]
-    labels = [
-        [search.ends[0].label],
-        *(list[str]() for _ in chain[1:-1]),
-        [search.ends[1].label],
-    ]  # an end keeps its label
+    labels = [list[str]() for _ in chain]
+    for at, end in zip((0, -1), search.solver.ends, strict=True):
+        labels[at].append(end.label)  # an end keeps its label
     kinks, gaps = list[Kink](), list[Gap]()
     for i, s in enumerate(stretches):
         if s.gap and s.length > _WIDE:

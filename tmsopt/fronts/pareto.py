@@ -5,12 +5,21 @@ from dataclasses import replace
 from itertools import takewhile
 from typing import Unpack
 
+import numpy as np
+
 from tmsopt.errors import MOST_POINTS, InputError, count_faults, input_error
 from tmsopt.executor import Executor, cores, here, processes
 from tmsopt.fronts.curve import fill_curve
 from tmsopt.fronts.front import Front, FrontPoint
-from tmsopt.fronts.parallel import MAX_PARALLEL, can_pickle, map_items
-from tmsopt.fronts.subproblems import FrontSolver, front_point, minimise_alone, solve_end
+from tmsopt.fronts.subproblems import (
+    MAX_PARALLEL,
+    FrontSolver,
+    can_pickle,
+    front_point,
+    map_items,
+    minimise_alone,
+    solve_end,
+)
 from tmsopt.fronts.surface import fill_surface
 from tmsopt.problem.files import Given, pose
 from tmsopt.problem.solution import Solution
@@ -101,10 +110,11 @@ def _front(executor: Executor, solver: FrontSolver, points: int, progress: Steps
             raise
         return replace(front, points=tuple(ends.values()), solved=n + len(ends), interrupted=True)
     reached = tuple(ends[k] for k in range(n))
-    ranges = [max(p.objectives[k] for p in reached) - min(p.objectives[k] for p in reached) for k in range(n)]
-    conflict = [r > _NO_CONFLICT * (1 + max(abs(p.objectives[k]) for p in reached)) for k, r in enumerate(ranges)]
-    solver = replace(solver, ranges=tuple(ranges), ends=reached)
-    if not (all(conflict) if n == 2 else any(conflict)):
+    values = np.array([p.objectives for p in reached])
+    ranges = np.ptp(values, axis=0)
+    conflict = ranges > _NO_CONFLICT * (1 + np.abs(values).max(axis=0))
+    solver = replace(solver, ranges=tuple(ranges.tolist()), ends=reached)
+    if not (conflict.all() if n == 2 else conflict.any()):
         best_in_all = min(reached, key=lambda p: sum(p.objectives))
         note = "the objectives do not conflict: one design is best in all of them, and the front is that point"
         return replace(front, points=(replace(best_in_all, label="best in all"),), notes=(note,))

@@ -1,16 +1,26 @@
-"""Sub-problems of a Pareto front: minimise one objective with limits on the others (eps-constraints)."""
+"""Sub-problems of a Pareto front, solved in parallel: minimise one objective with limits on the others."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
+from typing import Any, TypeVar
 
 from tmsopt.evaluation.recheck import recheck
+from tmsopt.executor import Crash, EngineError, Executor
 from tmsopt.fronts.front import FrontPoint
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.program.options import STARTS, Options
 from tmsopt.search.solve import solve_any_status
+
+MAX_PARALLEL = 4
+"""Most sub-problems at a time, for any number of processes, since the next ones depend on all results."""
+
+T = TypeVar("T")
+R = TypeVar("R")
 
 RETRY = 16
 """Starts of a sub-problem that the neighbours' designs and a few starts did not solve."""
@@ -197,3 +207,29 @@ def _fix_at_bound(solver: FrontSolver, problem: Posed, k: int, best: Solution) -
     constraints = {n: text for n, text in problem.constraints.items() if n != limit_names(solver)[k]}
     start = {n: v for n, v in problem.start.items() if n in free}
     return problem.derive(fixed=fixed, free=free, constraints=constraints, start=start)
+
+
+def map_items(
+    executor: Executor, function: Callable[[FrontSolver, T], R], solver: FrontSolver, items: Sequence[T]
+) -> Iterator[tuple[int, R]]:
+    """Yield the index of each item with its result, as they finish; the same for any number of workers.
+
+    Raises:
+        EngineError: if an item ends every process that tries it.
+    """
+    with closing(executor.map(partial(function, solver), items)) as answers:
+        for place, answer in answers:
+            if isinstance(answer, Crash):
+                raise EngineError(f"a sub-problem of the front ends its process ({answer.cause})")
+            yield place, answer
+
+
+def can_pickle(thing: Any) -> bool:
+    """Whether an object can be sent to another process; a user's model may not."""
+    import cloudpickle
+
+    try:
+        cloudpickle.dumps(thing)
+    except Exception:
+        return False
+    return True

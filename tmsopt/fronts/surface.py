@@ -4,14 +4,16 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from tmsopt.executor import Executor
 from tmsopt.fronts.front import Front, Gap, efficient_points
-from tmsopt.fronts.parallel import map_items
 from tmsopt.fronts.subproblems import (
     RETRY,
     FrontSolver,
     build_subproblem,
     front_point,
+    map_items,
     minimise_limited,
     objective_values,
 )
@@ -42,7 +44,8 @@ def fill_surface(executor: Executor, solver: FrontSolver, front: Front, points: 
     """
     progress.begin("following the front", "sub-problem")
     ends = solver.ends
-    low, high = ([f(column) for column in zip(*(p.objectives for p in ends), strict=True)] for f in (min, max))
+    values = np.array([p.objectives for p in ends])
+    low, high = values.min(axis=0), values.max(axis=0)
     side, count, interrupted = min(points, MAX_SIDE), 0, False
     solved: dict[tuple[int, int], Solution | None] = {(side, side): ends[0].solution}  # the loosest limits are inactive
     failed: dict[int, str] = {}
@@ -53,7 +56,7 @@ def fill_surface(executor: Executor, solver: FrontSolver, front: Front, points: 
                 looser = [cell for cell in ((i + 1, j), (i, j + 1)) if max(cell) <= side]
                 if any(cell not in solved for cell in looser):  # looser limits are already infeasible
                     continue
-                limits = {k: low[k] + (high[k] - low[k]) * step / side for k, step in ((1, i), (2, j))}
+                limits = {k: float(low[k] + (high[k] - low[k]) * step / side) for k, step in ((1, i), (2, j))}
                 near = [s for s in map(solved.get, looser) if s is not None]
                 meets = [s for s in near if all(objective_values(solver, s)[k] <= v for k, v in limits.items())]
                 if meets:  # the optimum under looser limits is the optimum here
@@ -72,7 +75,7 @@ def fill_surface(executor: Executor, solver: FrontSolver, front: Front, points: 
         interrupted = True
     ordered = [solved[cell] for cell in sorted(solved, key=lambda cell: (-sum(cell), -cell[0]))]
     every = [*ends, *(front_point(solver, s) for s in {id(s): s for s in ordered if s is not None}.values())]
-    kept = efficient_points(every, [_SAME * (h - b) for b, h in zip(low, high, strict=True)])
+    kept = efficient_points(every, _SAME * (high - low))
     gaps = tuple(Gap(f"not solved for {text}; try more starts", 0, True) for _, text in sorted(failed.items()))
     return replace(front, points=tuple(kept), gaps=gaps, solved=count + 3, interrupted=interrupted)
 

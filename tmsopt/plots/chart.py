@@ -1,6 +1,6 @@
 """Stability charts drawn with their exact boundary curves."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
-from matplotlib.colors import BoundaryNorm, CenteredNorm, ListedColormap
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -54,18 +54,33 @@ _LAYERS = {"damping_ratio": "damping ratio", "real_roots": "number of real roots
 """Words for layers of numbers; quantities have their own name."""
 
 
-def fill_classes(ax: Axes, chart: Chart, plane: PlaneAxes) -> None:
-    """The class of every grid point as a colour."""
-    _fill_counts(ax, chart, plane, "kind", CLASS_COLOURS)
+def draw_layer(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> Legend:
+    """A layer as colours, exact boundaries on top, hatched where a constraint is violated; names and legend entries."""
+    model, handles = chart.problem.model, list[Artist]()
+    if layer == "kind":
+        handles += class_handles(chart.kind, model)
+        _fill(ax, chart, plane, layer, cmap=ListedColormap(CLASS_COLOURS), vmin=-0.5, vmax=len(CLASSES) - 0.5)
+    else:
+        _fill_numbers(ax, chart, plane, layer)
+    names, curves = domain_curves(ax, chart.domain, plane, model)
+    return names, [*handles, *curves, *_hatch_violations(ax, chart, plane)]
+
+
+def _fill(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str, **look: Any) -> QuadMesh:
+    """A layer as colours, in a plane with its symbols and units, with limits at the ends of the grid."""
+    x, y = grid = _grid(chart, plane)
+    plane.label(ax)
+    ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    return ax.pcolormesh(*grid, chart.layers[layer], rasterized=True, **look)
 
 
 def class_handles(kind: NDArray[np.int8], model: Model) -> list[Patch]:
     """Legend entries of the classes that occur."""
     how = "unstable by" if model.carrier is None else "gain, beyond"
     words = {kind: f"{how} {word}" for kind, word in events_of(model).items()}
-    present = [code for code in range(len(CLASSES)) if np.any(kind == code)]
     return [
-        Patch(facecolor=CLASS_COLOURS[k], edgecolor="grey", label=words.get(CLASSES[k], CLASSES[k])) for k in present
+        Patch(facecolor=CLASS_COLOURS[code], edgecolor="grey", label=words.get(CLASSES[code], CLASSES[code]))
+        for code in np.unique(kind)
     ]
 
 
@@ -75,29 +90,20 @@ def domain_curves(ax: Axes, domain: Domain | None, plane: PlaneAxes, model: Mode
     Args:
         model: in whose words.
     """
-    names: list[Name] = []
-    handles: list[Artist] = []
+    names, handles = list[Name](), list[Artist]()
     if domain is None:
         return names, handles
     for name, words, colour, width in _BOUNDARIES:
+        around = withStroke(linewidth=width + 1.2, foreground="white", alpha=0.6)
         for arc in getattr(domain, name):
             style, how = _KINDS.get(arc.kind, ("-", ""))
-            around = withStroke(linewidth=width + 1.2, foreground="white", alpha=0.6)
-            look: dict[str, Any] = {"color": colour, "linestyle": style, "linewidth": width}
-            ax.plot(*plane.to_axis(arc.points), path_effects=[around], **look)
-            handles.append(Line2D([], [], label=words + how, **look))
+            look: dict[str, Any] = {"color": colour, "linestyle": style, "linewidth": width, "label": words + how}
+            handles += ax.plot(*plane.to_axis(arc.points), path_effects=[around], **look)
     for corner in domain.corners:
         x, y = plane.to_axis(corner.parameters)
         ax.plot(x, y, "o", color=MARK, markersize=4, zorder=5)
         names.append(Name(in_words_of(model, corner.name), x, y))
     return names, handles
-
-
-def frame(ax: Axes, chart: Chart, plane: PlaneAxes) -> None:
-    """Symbols and units of the two parameters, and limits at the ends of the grid."""
-    x, y = _grid(chart, plane)
-    plane.label(ax)
-    ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
 
 
 def plane_of(chart: Chart) -> PlaneAxes:
@@ -134,9 +140,9 @@ def draw_domain(
     arcs = (*data.stability, *data.heavy_damping, *data.parting)
     varying = [n for n in (arcs[0].points if arcs else ()) if any(np.ptp(a.points[n]) > 0 for a in arcs)]
     plane = plane_over(problem.posed if problem else None, horizontal, vertical, *varying)
-    drawn = on_axes(ax, 6.4, 5.0, problem.title if problem else "")
-    plane.label(drawn)
-    return finish_axes(drawn, ax is None, *domain_curves(drawn, data, plane, problem.model if problem else tms))
+    ax = on_axes(ax, 6.4, 5.0, problem.title if problem else "")
+    plane.label(ax)
+    return finish_axes(ax, *domain_curves(ax, data, plane, problem.model if problem else tms))
 
 
 def draw_chart(
@@ -167,22 +173,15 @@ def draw_chart(
     plane = plane_of(data)
     if layer not in data.layers:
         raise input_error(f"found '{layer}'; {suggest(layer, data.layers)}", "layer")
-    drawn = on_axes(ax, 6.4, 5.4, data.problem.title)
-    if layer == "kind":
-        fill_classes(drawn, data, plane)
-    else:
-        _fill_layer(drawn, data, plane, layer)
-    names, curves = domain_curves(drawn, data.domain, plane, data.problem.model)
-    classes = class_handles(data.kind, data.problem.model) if layer == "kind" else []
-    handles: list[Artist] = [*classes, *curves, *_hatch_violations(drawn, data, plane)]
+    ax = on_axes(ax, 6.4, 5.4, data.problem.title)
+    names, handles = draw_layer(ax, data, plane, layer)
     if layer == "abscissa" and optimum:
-        handles += _optimum(drawn, data, plane)
+        handles += _optimum(ax, data, plane)
     if design is not None:
         x, y = at = plane.to_axis(design.parameters)
-        handles += _mark(drawn, at, "D", f"the design ({design.structure})")
+        handles += _mark(ax, at, "D", f"the design ({design.structure})")
         names.append(Name("design", x, y))
-    frame(drawn, data, plane)
-    return finish_axes(drawn, ax is None, names, handles)
+    return finish_axes(ax, names, handles)
 
 
 def chart_figure(chart: Chart, layer: str = "kind", design: Solution | None = None) -> Figure:
@@ -198,12 +197,12 @@ def chart_figure(chart: Chart, layer: str = "kind", design: Solution | None = No
     return figure_of(draw_chart(chart, None, layer, design))
 
 
-def _grid(chart: Chart, plane: PlaneAxes) -> tuple[Array, Array]:
-    first, second = (scale.to_axis(values) for scale, values in zip(plane, chart.grid, strict=True))
-    return first, second
+def _grid(chart: Chart, plane: PlaneAxes) -> list[Array]:
+    """Values along both axes, as they stand there."""
+    return [scale.to_axis(values) for scale, values in zip(plane, chart.grid, strict=True)]
 
 
-def _hatch_violations(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Patch]:
+def _hatch_violations(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Artist]:
     """Hatching where a constraint does not hold, and a line where it just does; its legend entry."""
     if "satisfied" not in chart.layers or chart.satisfied.all():
         return []
@@ -215,57 +214,47 @@ def _hatch_violations(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Patch]:
     return [Patch(facecolor="none", edgecolor="0.4", hatch="//", linewidth=0, label="constraint violated")]
 
 
-def _fill_counts(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str, colours: Sequence[str] | Array) -> QuadMesh:
-    """A layer of whole numbers from 0 on, each as a colour."""
-    norm = BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
-    shades = ListedColormap(colours)
-    return ax.pcolormesh(*_grid(chart, plane), chart.layers[layer], cmap=shades, norm=norm, rasterized=True)
-
-
-def _fill_layer(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> None:
+def _fill_numbers(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> None:
     """The abscissa, damping ratio, number of real roots or a quantity, with its colour bar."""
-    grid, figure = _grid(chart, plane), figure_of(ax)
-    label = _LAYERS.get(layer, layer)
+    bar: dict[str, Any] = {"label": _LAYERS.get(layer, layer), "extend": "both"}
+    values = np.ma.masked_invalid(np.asarray(chart.layers[layer], dtype=float))
+    low, high = np.percentile(values.compressed(), _SHOWN) if values.count() else (0.0, 1.0)
+    look = {"cmap": "cividis", "vmin": low, "vmax": high}
     if layer == "real_roots":
-        counts = np.arange(chart.problem.model.degree + 1)
-        shades = colormaps["cividis"](np.linspace(0, 1, len(counts)))
-        figure.colorbar(_fill_counts(ax, chart, plane, layer, shades), ax=ax, label=label, ticks=counts)
-        return
-    values = np.asarray(chart.layers[layer], dtype=float)
-    known = values[np.isfinite(values)]
-    low, high = (float(np.percentile(known, q)) for q in _SHOWN) if known.size else (0.0, 1.0)
-    if layer == "abscissa":
-        norm = CenteredNorm(0.0, max(abs(low), abs(high)) or 1.0)
-        mesh = ax.pcolormesh(*grid, values, cmap="RdBu_r", norm=norm, rasterized=True)
+        numbers = chart.problem.model.degree + 1
+        look = {"cmap": colormaps["cividis"].resampled(numbers), "vmin": -0.5, "vmax": numbers - 0.5}
+        bar |= {"ticks": range(numbers), "extend": "neither"}
+    elif layer == "abscissa":
+        most = max(abs(low), abs(high)) or 1.0
+        look = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
+        bar["label"] = abscissa_label(chart.problem.posed)
+        grid = _grid(chart, plane)
         levels = [x for x in MaxNLocator(9).tick_values(low, high) if low <= x <= high and x != 0]
-        drawn = ax.contour(*grid, np.ma.masked_invalid(values), levels=levels, colors="0.15", linewidths=0.6)
+        drawn = ax.contour(*grid, values, levels=levels, colors="0.15", linewidths=0.6)
         for text in ax.clabel(drawn, fontsize=6.5, fmt="%.3g"):
             text.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
         if chart.domain is None:
-            ax.contour(*grid, np.ma.masked_invalid(values), levels=[0.0], colors=LINE, linewidths=1.6)
-        figure.colorbar(mesh, ax=ax, label=abscissa_label(chart.problem.posed), extend="both")
-        return
-    mesh = ax.pcolormesh(*grid, values, cmap="cividis", vmin=low, vmax=high, rasterized=True)
-    figure.colorbar(mesh, ax=ax, label=label, extend="both" if low > known.min(initial=low) else "max")
+            ax.contour(*grid, values, levels=[0.0], colors=LINE, linewidths=1.6)
+    figure_of(ax).colorbar(_fill(ax, chart, plane, layer, **look), ax=ax, **bar)
 
 
 def _optimum(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Line2D]:
     """The best design of the plane, solved for or of the grid: a star, and the legend says which."""
     problem = chart.problem.posed.nominal
+    of_H = problem.model.carrier is not None
     if problem.objective is not None or problem.pattern is not None:
         found = solve(problem, throw=False, interruptible=False)
         if found.status == "optimal":
-            word = "abscissa" if problem.model.carrier is None else "largest Im ω"
-            label = f"optimum ({found.structure}), {word} {found.abscissa:.4g}"
+            label = f"optimum ({found.structure}), {'largest Im ω' if of_H else 'abscissa'} {found.abscissa:.4g}"
             return _mark(ax, plane.to_axis(found.parameters), "*", label)
-    allowed = chart.satisfied if "satisfied" in chart.layers else np.ones(chart.abscissa.shape, bool)
-    values = np.where(allowed & np.isfinite(chart.abscissa), chart.abscissa, np.inf)
-    row, column = np.unravel_index(int(values.argmin()), values.shape)
-    if not np.isfinite(values[row, column]):
+    allowed = np.isfinite(chart.abscissa) & chart.layers.get("satisfied", np.True_)
+    if not allowed.any():
         return []
+    values = np.where(allowed, chart.abscissa, np.inf)
+    row, column = np.unravel_index(values.argmin(), values.shape)
     x, y = _grid(chart, plane)
-    word = "least abscissa" if problem.model.carrier is None else "best Im ω"
-    return _mark(ax, (x[column], y[row]), "*", f"{word} on the grid, {values[row, column]:.4g}")
+    label = f"{'best Im ω' if of_H else 'least abscissa'} on the grid, {values[row, column]:.4g}"
+    return _mark(ax, (x[column], y[row]), "*", label)
 
 
 def _mark(ax: Axes, at: Iterable[float], marker: str, label: str) -> list[Line2D]:

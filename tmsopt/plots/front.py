@@ -1,6 +1,7 @@
 """A Pareto front as a curve of two objectives, or as coloured points of three."""
 
 import re
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,18 +9,7 @@ from matplotlib.figure import Figure
 
 from tmsopt.fronts.front import Front, FrontPoint
 from tmsopt.plots.labels import Name, finish_axes, scale_of
-from tmsopt.plots.style import (
-    CAPSIZE,
-    COMPLEX,
-    CRITICAL,
-    HEAVY,
-    LINE,
-    MARK,
-    REAL,
-    STABLE,
-    figure_of,
-    on_axes,
-)
+from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, figure_of, on_axes
 from tmsopt.records import Array
 
 _STYLES = {
@@ -57,20 +47,21 @@ def draw_front(data: Front, ax: Axes | None = None) -> Axes:
 
     More: docs/how_to/fronts.md
     """
-    drawn = on_axes(ax, 6.4, 5.0, data.problem.title or "Pareto front")
+    ax = on_axes(ax, 6.4, 5.0, data.problem.title or "Pareto front")
     scales = [scale_of(data.problem.posed, text) for text in data.objectives]
-    values = np.stack([s.to_axis([p.objectives[k] for p in data.points]) for k, s in enumerate(scales)], axis=-1)
-    drawn.set(xlabel=scales[0].label, ylabel=scales[1].label)
+    columns = zip(*(p.objectives for p in data.points), strict=True)
+    values = np.stack([s.to_axis(column) for s, column in zip(scales, columns, strict=True)], axis=-1)
+    ax.set(xlabel=scales[0].label, ylabel=scales[1].label)
     if len(scales) == 2:
-        _draw_curve(drawn, data, values)
+        _draw_curve(ax, data, values)
     else:
-        coloured = drawn.scatter(values[:, 0], values[:, 1], c=values[:, 2], cmap="viridis", s=22, zorder=3)
-        figure_of(drawn).colorbar(coloured, ax=drawn, label=scales[2].label)
+        coloured = ax.scatter(values[:, 0], values[:, 1], 22, values[:, 2], zorder=3)
+        figure_of(ax).colorbar(coloured, ax=ax, label=scales[2].label)
     rings = values[[not p.stable for p in data.points], :2]
     if len(rings):  # not stable, or not known to be
-        drawn.plot(*rings.T, "o", color=LINE, markerfacecolor="none", markersize=8, zorder=2.5, label="not stable")
-    drawn.margins(0.08)
-    return finish_axes(drawn, ax is None, _names(data.points, values))
+        ax.plot(*rings.T, "o", color=LINE, markerfacecolor="none", markersize=8, zorder=2.5, label="not stable")
+    ax.margins(0.08)
+    return finish_axes(ax, _names(data.points, values))
 
 
 def front_figure(front: Front) -> Figure:
@@ -91,20 +82,18 @@ def _draw_curve(ax: Axes, front: Front, values: Array) -> None:
     """Two objectives: the curve, cut at gaps, and points by the structure of their roots."""
     gaps = {gap.index: gap for gap in front.gaps}
     stable = [bool(p.stable) for p in front.points]
-    for k in range(len(values) - 1):
-        piece = values[k : k + 2].T
-        if k not in gaps:
-            colour, style = (LINE, "-") if stable[k] and stable[k + 1] else (MARK, "--")
-            ax.plot(*piece, style, color=colour, linewidth=1, zorder=2)
-        else:
+    for k, piece in enumerate(np.stack([values[:-1], values[1:]], axis=-1)):
+        colour, style = (LINE, "-") if stable[k] and stable[k + 1] else (MARK, "--")
+        look: dict[str, Any] = {"color": colour, "linestyle": style, "linewidth": 1}
+        if k in gaps:
             label = "not solved" if gaps[k].failed else "gap: no efficient design"
-            ax.plot(*piece, ":", color=CAPSIZE, linewidth=0.8, zorder=1, label=label)
-    for structure in dict.fromkeys(p.structure for p in front.points):
-        colour, marker = _style(structure)
-        for kept, fill in ((True, colour), (False, "white")):
-            own = values[[p.structure == structure and s is kept for p, s in zip(front.points, stable, strict=True)]]
-            if len(own):
-                ax.plot(*own.T, marker, color=colour, markerfacecolor=fill, markersize=4, zorder=3, label=structure)
+            look = {"color": CAPSIZE, "linestyle": ":", "linewidth": 0.8, "label": label}
+        ax.plot(*piece, **look)
+    kinds = [(p.structure, s) for p, s in zip(front.points, stable, strict=True)]
+    for structure, kept in dict.fromkeys(kinds):
+        own, (colour, marker) = values[[kind == (structure, kept) for kind in kinds]], _style(structure)
+        fill = colour if kept else "white"
+        ax.plot(*own.T, marker, color=colour, markerfacecolor=fill, markersize=4, zorder=3, label=structure)
 
 
 def _names(points: tuple[FrontPoint, ...], values: Array) -> list[Name]:

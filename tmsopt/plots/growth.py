@@ -1,5 +1,6 @@
-"""Growth rates and frequencies over the speed, or another parameter, with their modes named."""
+"""Growth rates and frequencies over the speed, or another parameter, with their modes named; the events as a ruler."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from matplotlib.typing import LineStyleType
 
 from tmsopt.dynamics.growth import SPEEDS, Growth, growth
 from tmsopt.dynamics.modes import Mode
+from tmsopt.dynamics.speeds import Speeds
 from tmsopt.plots.labels import OF_H, AxisScale, Name, events_of, finish_axes, place_all, scale_over
 from tmsopt.plots.style import (
     CAPSIZE,
@@ -21,21 +23,20 @@ from tmsopt.plots.style import (
     draw_bands,
     legend_below,
     new_figure,
+    note,
     on_axes,
 )
 from tmsopt.problem.solution import Solution
 from tmsopt.records import Array
 
-_DASHED, _DOTTED = (0, (6, 2)), (0, (4, 2, 1, 2))
-_OTHERS: Sequence[tuple[str, LineStyleType]] = (
-    (CRITICAL, "-"),
-    (MARK, _DASHED),
-    (REAL, _DOTTED),
-    (COMPLEX, "-"),
-    (LINE, _DASHED),
-)
-_STYLES = dict(zip(("weave", "capsize", "castering", "capsize + castering"), _OTHERS, strict=False))
-_STYLES["second pair"] = (COMPLEX, _DASHED)
+_DASHED: LineStyleType = (0, (6, 2))
+_STYLES: Mapping[str, tuple[str, LineStyleType]] = {
+    "weave": (CRITICAL, "-"),
+    "capsize": (MARK, _DASHED),
+    "castering": (REAL, (0, (4, 2, 1, 2))),
+    "capsize + castering": (COMPLEX, "-"),
+    "second pair": (COMPLEX, _DASHED),
+}
 """Colours and lines of modes: of a bicycle by name, of others in their order at the design."""
 
 EVENTS: Mapping[str, tuple[str, LineStyleType]] = {
@@ -53,14 +54,13 @@ _LABELS = {
 
 _NOTHING = 1e-12  # of the range: less is 0 but for rounding
 
-_ALONG = 0.7, 0.17  # of the width of a plot: where the first name stands, and how far left of it the next
+_ROOM = 0.08  # of all that is shown of H, above and below it
 
-_INNER = 0.3, 0.9  # of a curve: between them, not at its ends
+_LEVELS = 3  # heights at which names of events stand in turn
+_MARGIN = 1.15  # times the last event
 
 _Curve = tuple[Mode, Array]
 """A mode, and its growth rates or frequencies as they stand on the axis."""
-
-_ROOM = 0.08  # of all that is shown of H, above and below it
 
 
 def draw_growth(data: Growth | Solution, ax: Axes | None = None) -> Axes:
@@ -107,58 +107,98 @@ def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: f
 
     More: docs/explanation/weave_and_capsize.md
     """
-    data = growth(data) if isinstance(data, Solution) else data
     figure = new_figure(6.4, 6.8)
     upper, lower = figure.subplots(2, 1, sharex=True)
-    names = [_curves(ax, data, part) for ax, part in ((upper, "real"), (lower, "imag"))]
+    data = growth(data) if isinstance(data, Solution) else data
+    named = [(ax, draw_curves(ax, data, part)) for ax, part in ((upper, "real"), (lower, "imag"))]
     upper.set_xlabel("")
     if (unit := metres_per_second) is not None and data.over.name == "Fr":
         speed = upper.secondary_xaxis("top", functions=(lambda x: x * unit, lambda x: x / unit))
         speed.set_xlabel("speed $v$ in m/s")
     figure.suptitle(title or data.problem.title, fontsize=11)
     legend_below(figure, upper.get_legend_handles_labels()[0])
-    place_all(list(zip((upper, lower), names, strict=True)))
+    place_all(named)
     return figure
+
+
+def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
+    """Every place where a root crosses the imaginary axis or roots meet.
+
+    The Axes show a ruler of the parameter, in the unit of the file, to a little beyond the last event: each event with
+    its name and value, heavier where stability changes, bands of stability and heavy damping, and the design.
+
+    Example:
+        >>> axes = tmsopt.plots.draw_speeds(tmsopt.speeds("problems/benchmark.toml"))
+        >>> [text.get_text() for text in axes.texts]
+        ['EP2 0.009546', 'weave 2.841']
+
+    More: docs/explanation/weave_and_capsize.md
+    """
+    problem = data.problem
+    ax = on_axes(ax, 6.4, 2.4, problem.title)
+    scale, words = scale_over(problem.posed, problem.posed.parameter_set[data.parameter]), events_of(problem.model)
+    at = data.parameters.get(data.parameter, data.lower)
+    last = _MARGIN * max(c.at for c in data.found) if data.found else data.lower + 2 * abs(at) + 1
+    high = data.upper if math.isfinite(data.upper) else max(last, _MARGIN * at)
+    draw_bands(ax, *(scale.to_axis(np.minimum(bands, high)) for bands in (data.stable, data.heavily_damped)))
+    for k, event in enumerate(data.found):
+        x, height = float(scale.to_axis(event.at)), 0.95 - 0.62 * (k % _LEVELS) / _LEVELS
+        colour, _ = EVENTS.get(event.kind, (REAL, ""))
+        ax.plot([x, x], [0, height], color=colour, linewidth=2.0 if event.changes else 0.9)
+        side = 3 if event.at < (data.lower + high) / 2 else -3
+        note(ax, f"{words.get(event.kind, event.kind)} {x:.4g}", (x, height), (side, 0), verticalalignment="top")
+    if data.parameter in data.parameters:
+        label = f"design at {scale.unit.show(at, 4)}"
+        ax.plot(scale.to_axis(at), 0.06, "^", color=LINE, label=label, clip_on=False)
+    ax.set(xlim=scale.to_axis([data.lower, high]), ylim=(0, 1.05), yticks=[], xlabel=scale.label)
+    ax.spines[["left", "right", "top"]].set_visible(False)
+    return finish_axes(ax)
 
 
 def _draw(data: Growth | Solution, ax: Axes | None, part: str) -> Axes:
     data = growth(data) if isinstance(data, Solution) else data
-    drawn = on_axes(ax, 6.4, 4.4, data.problem.title)
-    return finish_axes(drawn, ax is None, _curves(drawn, data, part))
+    ax = on_axes(ax, 6.4, 4.4, data.problem.title)
+    return finish_axes(ax, draw_curves(ax, data, part))
 
 
-def _curves(ax: Axes, data: Growth, part: str) -> list[Name]:
+def draw_curves(ax: Axes, data: Growth, part: str) -> list[Name]:
     """Everything but the legend; the names of the modes, to place."""
-    scale = scale_over(data.problem.posed, data.over)
+    scale, of_H = scale_over(data.problem.posed, data.over), _of_H(data)
     draw_bands(ax, scale.to_axis(data.stable), scale.to_axis(data.heavily_damped))
     names = list(dict.fromkeys(mode.name for mode in sorted(data.modes, key=lambda m: _rank_mode(m, data.design))))
-    shown = [m for m in data.modes if part == "real" or _of_H(data) or m.roots.imag.any()]
+    shown = [m for m in data.modes if part == "real" or of_H or m.roots.imag.any()]
     curves = [(m, _heights(data, m.values, m.roots, part)) for m in shown]
     for mode, y in curves:
-        colour, style = _STYLES.get(mode.name, _OTHERS[names.index(mode.name) % len(_OTHERS)])
-        level = 2 + 0.01 * names.index(mode.name)  # whole lines below dashed ones
-        ax.plot(scale.to_axis(mode.values), y, color=colour, linewidth=1.4, linestyle=style, zorder=level)
+        place = names.index(mode.name)
+        colour, style = _STYLES.get(mode.name, [*_STYLES.values()][place % len(_STYLES)])
+        level = 2 + 0.01 * place  # whole lines below dashed ones
+        ax.plot(scale.to_axis(mode.values), y, color=colour, linestyle=style, zorder=level)
     _marks(ax, data, scale, part)
-    label = _LABELS[part][data.rate is not None]
     first = min(0.0, data.values[0]) if data.over.name in SPEEDS else data.values[0]
     ax.set(
-        ylabel=OF_H[part] if _of_H(data) else label, xlabel=scale.label, xlim=scale.to_axis([first, data.values[-1]])
+        ylabel=OF_H[part] if of_H else _LABELS[part][data.rate is not None],
+        xlabel=scale.label,
+        xlim=scale.to_axis([first, data.values[-1]]),
     )
-    ax.set_ylim(_focus(data, curves, part))
-    found = _names(ax, scale, curves, names)
-    if _of_H(data):
+    if of_H:
+        ax.margins(y=_ROOM)
+    else:
+        ax.set_ylim(_focus(data, curves, part))
+    found = _names(ax, scale, curves)
+    if of_H:
         kind = "EP{}" if "EP" in data.structure else "{}-fold"
         for root, (own, z) in zip(data.multiple, _multiple(data), strict=True):
-            height = float(_heights(data, own, z, part).item())
-            found.append(Name(kind.format(root.multiplicity), float(scale.to_axis(own)), height))
+            height = _heights(data, own, z, part).item()
+            found.append(Name(kind.format(root.multiplicity), scale.to_axis(own).item(), height))
     return found
 
 
 def _heights(data: Growth, at: Any, roots: Any, part: str) -> Array:
     """Growth rates or frequencies as they stand on the axis, of roots at values of the parameter; of H ω = i s."""
-    rate = np.ones(1) if data.rate is None else np.interp(at, data.values, data.rate)
-    unit = -1.0 if _of_H(data) else 1.0 if data.rate is None else 2 * np.pi
-    return np.asarray(getattr(np.asarray(roots), part) * rate / (1.0 if part == "real" else unit), dtype=float)
+    heights = np.asarray(getattr(np.asarray(roots), part), dtype=float)
+    if data.rate is not None:
+        heights = heights * np.interp(at, data.values, data.rate) / (1 if part == "real" else 2 * np.pi)
+    return -heights if _of_H(data) and part == "imag" else heights
 
 
 def _of_H(data: Growth) -> bool:
@@ -172,57 +212,46 @@ def _marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
     for kind, (colour, style) in EVENTS.items():
         at = scale.to_axis([c.at for c in data.events if c.kind == kind])
         label = f"{words[kind]} at {', '.join(dict.fromkeys(f'{x:.4g}' for x in at))}{unit}"
-        for k, x in enumerate(at):
-            ax.axvline(x, color=colour, linewidth=1.1, linestyle=style, label=None if k else label)
+        for x in at:
+            ax.axvline(x, color=colour, linestyle=style, label=label)
     structure = f" ({data.structure})" if "EP" in data.structure else ""
     own = data.design if abs(data.design) > _NOTHING * np.ptp(data.values) else 0.0
     label = f"design at {scale.to_axis(own):.4g}{unit}{structure}"
-    ax.axvline(float(scale.to_axis(data.design)), color=LINE, linewidth=1.2, linestyle=":", label=label)
+    ax.axvline(float(scale.to_axis(data.design)), color=LINE, linestyle=":", label=label)
     met = [(c.at, complex(c.root.re, c.root.im)) for c in data.events if "EP" in c.kind] + _multiple(data)
     if met:
         places, roots = zip(*met, strict=True)
         label = "eigenfrequencies meet" if _of_H(data) else "roots meet"
         x, y = scale.to_axis(places), _heights(data, places, roots, part)
-        ax.plot(x, y, "o", markersize=4.5, color=LINE, markerfacecolor="white", zorder=4, label=label)
+        ax.plot(x, y, "o", color=LINE, markerfacecolor="white", zorder=4, label=label)
     if part == "real":
         ax.axhline(0, color="grey", linewidth=0.6, zorder=1)
 
 
 def _focus(data: Growth, curves: Sequence[_Curve], part: str) -> tuple[float, float]:
-    """Limits that show the roots around the design and the events, even where others run away; of H all there is."""
-    if _of_H(data):
-        every = np.concatenate([*(y for _, y in curves), [0.0] if part == "real" else []])
-        bottom, top = float(every.min()), float(every.max())
-        margin = _ROOM * (top - bottom or abs(top) or 1)
-        return bottom - margin, top + margin
-    centres = [data.design, *(c.at for c in data.events if c.kind in ("weave", "capsize"))]
-    low, high = min(centres), max(centres)
-    room = 0.25 * abs(data.design) + 0.05 * (data.values[-1] - data.values[0])
-    shown = [y[(part == "imag") | ((m.values >= low - room) & (m.values <= high + room))] for m, y in curves]
-    bottom, top = np.percentile(np.concatenate([*shown, [0.0]]), (1, 99)).tolist()
-    if part == "imag":
-        return 0.0, 1.2 * top or 0.1
-    margin = 0.2 * (top - bottom) or 0.1
-    return bottom - margin, top + margin
+    """Limits that show the roots around the design and the events, even where others run away."""
+    shown = [y for _, y in curves]
+    if part == "real":
+        centres = [data.design, *(c.at for c in data.events if c.kind in ("weave", "capsize"))]
+        room = 0.25 * abs(data.design) + 0.05 * (data.values[-1] - data.values[0])
+        low, high = min(centres) - room, max(centres) + room
+        shown = [y[(m.values >= low) & (m.values <= high)] for m, y in curves]
+    bottom, top = np.percentile(np.concatenate([*shown, [0.0]]), (1, 99)) * (part == "real", 1)
+    room = 0.2 * (top - bottom) or 0.1
+    return bottom - room * (part == "real"), top + room
 
 
-def _names(ax: Axes, scale: AxisScale, curves: Sequence[_Curve], names: Sequence[str]) -> list[Name]:
-    """Each mode's name where the longest of its curves is in sight, those of several modes spread out."""
-    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-    found = []
-    for k, name in enumerate(names):
-        pieces = []
-        for mode, y in curves:
-            x = scale.to_axis(mode.values)
-            seen = (x > left) & (x < right) & (y > bottom) & (y < top)
-            if mode.name == name and seen.any():
-                pieces.append((x[seen], y[seen]))
-        if pieces:
-            x, y = max(pieces, key=lambda piece: float(np.ptp(piece[0])))
-            place = left + (_ALONG[0] - _ALONG[1] * k) * (right - left)
-            at = int(np.abs(x - np.clip(place, *np.quantile([x[0], x[-1]], _INNER))).argmin())
-            found.append(Name(name, float(x[at]), float(y[at])))
-    return found
+def _names(ax: Axes, scale: AxisScale, curves: Sequence[_Curve]) -> list[Name]:
+    """Each mode's name in the middle of the longest of its curves that is in sight."""
+    low, high = np.reshape([ax.get_xlim(), ax.get_ylim()], (2, 2, 1)).swapaxes(0, 1)
+    longest: dict[str, tuple[float, Name]] = {}
+    for mode, heights in curves:
+        points = np.array([scale.to_axis(mode.values), heights])
+        x, y = points[:, ((points > low) & (points < high)).all(axis=0)]
+        if x.size and np.ptp(x) >= longest.get(mode.name, (0.0, None))[0]:
+            middle = np.abs(x - (x[0] + x[-1]) / 2).argmin()
+            longest[mode.name] = np.ptp(x), Name(mode.name, float(x[middle]), float(y[middle]))
+    return [name for _, name in longest.values()]
 
 
 def _multiple(data: Growth) -> list[tuple[float, complex]]:

@@ -1,7 +1,6 @@
 """Names of marked points, units and labels of axes, words for modes, and legends."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -9,14 +8,12 @@ import numpy as np
 import textalloc
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike
 
 from tmsopt.models import Model, Parameter, words_of
-from tmsopt.plots.style import figure_of, legend_below
+from tmsopt.plots.style import draw_legend, figure_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import Unit, unit_of
 from tmsopt.records import Array
@@ -27,8 +24,6 @@ _SAME = 0.02  # of an axis: names of marks so close would stand beside the wrong
 
 OF_H = {"real": r"$\mathrm{Im}\,\omega$ (loss negative)", "imag": r"$\mathrm{Re}\,\omega$"}
 """Axes of the real and imaginary parts of s = −i ω of a complex H."""
-
-FROUDE = r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$"
 
 
 @dataclass(frozen=True)
@@ -99,12 +94,11 @@ def scale_of(problem: Posed, text: str) -> AxisScale:
 
 def scale_over(problem: Posed, parameter: Parameter) -> AxisScale:
     """The axis of a parameter of a problem, or of a native one that the problem is not written in."""
+    if parameter.name == "Fr":
+        return AxisScale("Fr", r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$")
     if parameter.name in problem.parameter_set.names:
-        found = scale_of(problem, parameter.name)
-    else:
-        unit = "" if parameter.unit == "1" else parameter.unit
-        found = AxisScale(parameter.name, f"${parameter.latex}$", Unit(unit))
-    return AxisScale("Fr", FROUDE) if parameter.name == "Fr" else found
+        return scale_of(problem, parameter.name)
+    return AxisScale(parameter.name, f"${parameter.latex}$", Unit("" if parameter.unit == "1" else parameter.unit))
 
 
 def abscissa_label(problem: Posed, words: str = "spectral abscissa") -> str:
@@ -122,13 +116,9 @@ def events_of(model: Model) -> dict[str, str]:
     return {**words_of(model), "infinity": "root at infinity"}
 
 
-def finish_axes(ax: Axes, own: bool, names: Sequence[Name] = (), handles: Sequence[Artist] | None = None) -> Axes:
-    """The Axes with their legend, below a figure of their own, and names beside their points."""
-    shown = ax.get_legend_handles_labels()[0] if handles is None else handles
-    if own:
-        legend_below(figure_of(ax), shown)
-    elif shown:
-        ax.legend(handles=list({str(h.get_label()): h for h in shown}.values()), fontsize=7, framealpha=0.9)
+def finish_axes(ax: Axes, names: Sequence[Name] = (), handles: Sequence[Artist] | None = None) -> Axes:
+    """The Axes with their legend and names beside their points."""
+    draw_legend(ax, ax.get_legend_handles_labels()[0] if handles is None else handles)
     place_names(ax, names)
     return ax
 
@@ -147,70 +137,53 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
 
     More: docs/how_to/tracing.md
     """
-    low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
-    merged: list[tuple[np.ndarray, list[str]]] = []
-    for name in names:
-        place = np.array([name.x, name.y])
-        if np.any((place - low) * (place - high) > 0):
-            continue
-        near = [m for m in merged if np.all(np.abs(m[0] - place) <= _SAME * np.abs(high - low))]
-        if not near:
-            merged.append((place, [name.text]))
-        elif name.text not in near[0][1]:
-            near[0][1].append(name.text)
-    if not merged:
-        return
-    places = np.array([place for place, _ in merged])
-    with freeze_layout(figure_of(ax)):
-        curves = [xy for line in ax.get_lines() for xy in _visible_pieces(ax, line.get_xydata())]
-        textalloc.allocate(
-            ax,
-            places[:, 0],
-            places[:, 1],
-            [", ".join(words) for _, words in merged],
-            x_scatter=places[:, 0],
-            y_scatter=places[:, 1],
-            x_lines=[xy[:, 0] for xy in curves],
-            y_lines=[xy[:, 1] for xy in curves],
-            textsize=_SIZE,
-            linecolor="0.4",
-            linewidth=0.6,
-            zorder=7,
-            path_effects=[withStroke(linewidth=2.5, foreground="white")],
-        )
+    if names:
+        place_all([(ax, names)])
 
 
 def place_all(found: Sequence[tuple[Axes, Sequence[Name]]]) -> None:
-    """The same in several Axes of one figure."""
-    with freeze_layout(figure_of(found[0][0])):
-        for ax, names in found:
-            place_names(ax, names)
-
-
-@contextmanager
-def freeze_layout(figure: Figure) -> Iterator[None]:
-    """The layout as it is when drawn, and with it how large a text is in the axes; drawn again, it is not sought anew.
-
-    Inside another of these nothing is left to do.
-    """
+    """The same in several Axes of one figure, whose layout stands meanwhile: it says how large a text is in them."""
+    figure = figure_of(found[0][0])
     engine = figure.get_layout_engine()
-    if isinstance(engine, PlaceHolderLayoutEngine):
-        yield
-        return
     figure.draw_without_rendering()
-    if engine is None:
-        yield
-        return
     figure.set_layout_engine("none")
-    try:
-        yield
-    finally:
-        figure.set_layout_engine(engine)
+    for ax, names in found:
+        _place(ax, names)
+    figure.set_layout_engine(engine)
+
+
+def _place(ax: Axes, names: Sequence[Name]) -> None:
+    low, high = np.sort([ax.get_xlim(), ax.get_ylim()]).T
+    merged: dict[tuple[float, float], list[str]] = {}
+    for name in names:
+        place = name.x, name.y
+        if np.array_equal(np.clip(place, low, high), place):
+            near = (p for p in merged if np.all(np.abs(np.subtract(p, place)) <= _SAME * (high - low)))
+            words = merged.setdefault(next(near, place), [])
+            words += [name.text] * (name.text not in words)
+    if not merged:
+        return
+    x, y = np.array([*merged]).T
+    curves = [xy.T for line in ax.get_lines() for xy in _visible_pieces(ax, line.get_xydata())]
+    textalloc.allocate(
+        ax,
+        x,
+        y,
+        [", ".join(words) for words in merged.values()],
+        x_scatter=x,
+        y_scatter=y,
+        x_lines=[xy[0] for xy in curves],
+        y_lines=[xy[1] for xy in curves],
+        textsize=_SIZE,
+        linecolor="0.4",
+        linewidth=0.6,
+        zorder=7,
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],
+    )
 
 
 def _visible_pieces(ax: Axes, xy: ArrayLike) -> list[Array]:
     """The pieces of a curve inside the figure, by as few points as show it to a tenth of a pixel."""
     width, height = figure_of(ax).canvas.get_width_height(physical=True)
     drawn = Path(np.asarray(xy, dtype=float)).to_polygons(ax.transData, width, height, closed_only=False)
-    pieces = (np.asarray(piece, dtype=float) for piece in drawn)
-    return [np.asarray(ax.transData.inverted().transform(piece)) for piece in pieces if len(piece) > 1]
+    return [ax.transData.inverted().transform(piece) for piece in map(np.asarray, drawn) if len(piece) > 1]

@@ -34,20 +34,21 @@ def draw_rounding(data: Explanation, ax: Axes | None = None) -> Axes:
 
     More: docs/how_to/report.md
     """
-    own = ax is None
-    rows = [("all", row) for row in data.precision] + [*data.rounding.items()]
+    rows = [*(("all", row) for row in data.precision), *data.rounding.items()]
     ax = on_axes(ax, 6.0, 1.3 + 0.32 * len(rows), "what rounding does to the abscissa")
-    names = [
-        f"{name} to {row.digits} digits" + (f"\nviolates {', '.join(row.violations)}" if row.violations else "")
+    bars = [
+        (
+            "\nviolates ".join(filter(None, (f"{name} to {row.digits} digits", ", ".join(row.violations)))),
+            max(abs(row.loss), _LEAST),
+            row.loss <= 0,
+        )
         for name, row in rows
     ]
-    sizes = [max(abs(row.loss), _LEAST) for _, row in rows]
-    words = ("rises: decays more slowly", "falls: decays faster")
-    _bars(ax, names, sizes, [row.loss <= 0 for _, row in rows], words)
-    decades = [np.floor(np.log10(min(sizes, default=1.0))), np.ceil(np.log10(max(sizes, default=1.0)) + 1e-9)]
-    ax.set(xscale="log", xlim=np.power(10.0, decades), xlabel="change of the abscissa")
+    _bars(ax, bars, ("rises: decays more slowly", "falls: decays faster"))
+    decades = np.floor(np.log10([size for _, size, _ in bars] or [1.0]))
+    ax.set(xscale="log", xlim=(10 ** decades.min(), 10 ** (decades.max() + 1)), xlabel="change of the abscissa")
     ax.xaxis.set_minor_formatter(NullFormatter())
-    return finish_axes(ax, own)
+    return finish_axes(ax)
 
 
 def draw_robustness(data: Robustness | Nearest, ax: Axes | None = None) -> Axes:
@@ -63,27 +64,26 @@ def draw_robustness(data: Robustness | Nearest, ax: Axes | None = None) -> Axes:
 
     More: docs/how_to/tolerances.md
     """
-    own, relative = ax is None, False
+    nearest, words = data if isinstance(data, Nearest) else data.limit, _TOWARDS
+    near, times, unit = [nearest], 1.0, ""
     if isinstance(data, Robustness):
-        nearest, relative = data.limit, data.relative
         words = {**_TOWARDS, **words_of(data.problem.model)}
         near = [n for n in (data.weave, data.capsize, data.infinity, data.heavy_damping) if n.found]
-    else:
-        nearest, near, words = data, [data], _TOWARDS
-    times, unit = (100.0, "\N{NO-BREAK SPACE}%") if relative else (1.0, "")
-    parts = [(n, x) for n, x in nearest.direction.items() if abs(x) > _SEEN * nearest.distance]
-    parts.sort(key=lambda item: -abs(item[1]))
+        if data.relative:
+            times, unit = 100.0, "\N{NO-BREAK SPACE}%"
+    parts = [(n, times * x, False) for n, x in nearest.direction.items() if abs(x) > _SEEN * nearest.distance]
+    parts.sort(key=lambda part: -abs(part[1]))
     ax = on_axes(ax, 6.0, 1.3 + 0.26 * len(parts))
     far = ", ".join(f"{words.get(n.kind, n.kind)} at {times * n.distance:.3g}{unit}" for n in near)
     ax.set_title(fill(far, 62) or "no boundary found", fontsize=9.5)
-    _bars(ax, [name for name, _ in parts], [times * x for _, x in parts])
+    _bars(ax, parts)
     ax.axvline(0, color="grey", linewidth=0.6)
     if not parts:
         said = "the design is on the boundary" if nearest.found else "none was found"
         ax.text(0.5, 0.5, said, transform=ax.transAxes, horizontalalignment="center", fontsize=9)
     towards = f"change towards {words.get(nearest.kind, nearest.kind)}"
-    ax.set_xlabel(f"{towards} in {'%' if relative else 'units of the weights'}")
-    return finish_axes(ax, own)
+    ax.set_xlabel(f"{towards} in {unit.strip() or 'units of the weights'}")
+    return finish_axes(ax)
 
 
 def draw_comparison(data: Comparison, ax: Axes | None = None) -> Axes:
@@ -99,15 +99,13 @@ def draw_comparison(data: Comparison, ax: Axes | None = None) -> Axes:
 
     More: docs/explanation/paper.md
     """
-    own = ax is None
     rows = [row for row in data.laws if row.applies]
     ax = on_axes(ax, 6.0, 1.4 + 0.26 * len(rows), data.design.problem.title)
-    agree = [bool(row.agrees) for row in rows]
-    names = [f"{row.label}: {row.subject}" for row in rows]
-    _bars(ax, names, [max(abs(row.relative), _LEAST) for row in rows], agree, ("differs", "agrees"))
+    bars = [(f"{row.label}: {row.subject}", max(abs(row.relative), _LEAST), bool(row.agrees)) for row in rows]
+    _bars(ax, bars, ("differs", "agrees"))
     ax.axvline(SAME_LAW, color="black", linestyle="--", linewidth=1, label=f"agrees up to {SAME_LAW:g}")
     ax.set(xscale="log", xlim=(_LEAST, None), xlabel="relative difference from the law")
-    return finish_axes(ax, own)
+    return finish_axes(ax)
 
 
 def draw_ledger(data: Ledger, ax: Axes | None = None) -> Axes:
@@ -121,14 +119,13 @@ def draw_ledger(data: Ledger, ax: Axes | None = None) -> Axes:
 
     More: docs/explanation/paper.md
     """
-    own, counts = ax is None, data.counts
-    ax = on_axes(ax, 6.0, 1.2 + 0.3 * len(counts), f"{len(data.entries)} claims of the paper")
-    _bars(ax, list(counts), [float(n) for n in counts.values()])
-    for k, n in enumerate(counts.values()):
-        note(ax, str(n), (n, k), (4, 0), verticalalignment="center")
+    ax = on_axes(ax, 6.0, 1.2 + 0.3 * len(data.counts), f"{len(data.entries)} claims of the paper")
+    _bars(ax, [(verdict, count, False) for verdict, count in data.counts.items()])
+    for k, count in enumerate(data.counts.values()):
+        note(ax, str(count), (count, k), (4, 0), verticalalignment="center")
     ax.margins(x=0.12)
     ax.set_xlabel("claims")
-    return finish_axes(ax, own)
+    return finish_axes(ax)
 
 
 def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
@@ -144,39 +141,31 @@ def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
 
     More: docs/how_to/all_designs.md
     """
-    own = ax is None
     if not data.solutions:
         return on_axes(ax, 6.0, 4.4, "no design found")
     problem = data.solutions[0].problem
     ax = on_axes(ax, 6.0, 4.4, problem.title)
     scales = [scale_of(problem.posed, name) for name in [*problem.free][:2]]
-    points = np.stack([s.to_axis([d.parameters[s.name] for d in data.solutions]) for s in scales], axis=-1)
-    if len(scales) < 2:
-        ax.set_ylabel(abscissa_label(problem.posed))
-        points = np.stack([points[:, 0], [d.abscissa for d in data.solutions]], axis=-1)
-    proved = data.proved or (False,) * len(points)
-    for wanted, inside, label in ((True, CRITICAL, "proved"), (False, "white", "found")):
-        own_points = points[[p is wanted for p in proved]]
-        if len(own_points):
-            ax.plot(*own_points.T, "o", color=CRITICAL, markerfacecolor=inside, label=label, linestyle="none")
+    columns = [scale.to_axis([d.parameters[scale.name] for d in data.solutions]) for scale in scales]
     for scale, letter in zip(scales, "xy", strict=False):
         ax.set(**{f"{letter}label": scale.label, f"{letter}lim": scale.to_axis(problem.free[scale.name])})
-    names = [Name(f"{d.abscissa:.4g}", float(x), float(y)) for d, (x, y) in zip(data.solutions, points, strict=True)]
-    return finish_axes(ax, own, names)
+    if len(scales) < 2:
+        columns.append(np.array([d.abscissa for d in data.solutions]))
+        ax.set_ylabel(abscissa_label(problem.posed))
+    points = np.transpose(columns)
+    proved = data.proved or (False,) * len(points)
+    for point, is_proved in zip(points, proved, strict=True):
+        inside, label = (CRITICAL, "proved") if is_proved else ("white", "found")
+        ax.plot(*point, "o", color=CRITICAL, markerfacecolor=inside, label=label)
+    return finish_axes(
+        ax, [Name(f"{d.abscissa:.4g}", *at) for d, at in zip(data.solutions, points.tolist(), strict=True)]
+    )
 
 
-def _bars(
-    ax: Axes,
-    names: Sequence[str],
-    lengths: Sequence[float],
-    second: Sequence[bool] | None = None,
-    words: tuple[str, str] = ("", ""),
-) -> None:
+def _bars(ax: Axes, bars: Sequence[tuple[str, float, bool]], words: tuple[str, str] = ("", "")) -> None:
     """Horizontal bars by name, the first one uppermost; of a second kind hatched, with words for each kind."""
-    for kind, (colour, hatch) in enumerate(((CRITICAL, ""), (STABLE, "//"))):
-        chosen = [k for k in range(len(names)) if (second[k] if second else False) is bool(kind)]
-        if chosen:
-            sizes, label = [lengths[k] for k in chosen], words[kind] or None
-            ax.barh(chosen, sizes, color=colour, hatch=hatch, edgecolor="white", height=0.7, label=label)
-    ax.set_yticks(range(len(names)), names, fontsize=8)
+    for place, (_, length, second) in enumerate(bars):
+        colour, hatch = (STABLE, "//") if second else (CRITICAL, "")
+        ax.barh(place, length, 0.7, color=colour, hatch=hatch, edgecolor="white", label=words[second])
+    ax.set_yticks(range(len(bars)), [name for name, *_ in bars], fontsize=8)
     ax.invert_yaxis()

@@ -12,8 +12,6 @@ from tmsopt.plots.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, new_f
 
 _COLOURS = (CRITICAL, MARK, REAL, HEAVY, COMPLEX, LINE)
 _LATEX = {"phi": r"lean $\varphi$", "delta": r"steer $\delta$", "T_phi": r"lean torque", "T_delta": r"steer torque"}
-_TORQUES = ("T_phi", "T_delta")
-_TITLE = 11
 
 
 def draw_motion(motion: Simulation, ax: Axes | None = None) -> Axes:
@@ -26,10 +24,9 @@ def draw_motion(motion: Simulation, ax: Axes | None = None) -> Axes:
 
     More: docs/how_to/motion.md
     """
-    own = ax is None
     ax = on_axes(ax, 6.4, 3.2, motion.problem.title)
     _angles(motion, ax)
-    return finish_axes(ax, own)
+    return finish_axes(ax)
 
 
 def motion_figure(motion: Simulation) -> Figure:
@@ -42,45 +39,42 @@ def motion_figure(motion: Simulation) -> Figure:
 
     More: docs/how_to/motion.md
     """
-    known = {*motion.columns}
-    parts = [_angles, *[_torques] * bool(known & {*_TORQUES}), *[_path] * ("x" in known)]
+    parts = [_angles, *[_torques] * ("T_delta" in motion.columns), *[_path] * ("x" in motion.columns)]
     figure = new_figure(6.4, 1.0 + 2.4 * len(parts))
     axes = figure.subplots(len(parts), 1, squeeze=False)[:, 0]
-    axes[0].set_title(motion.problem.title, fontsize=_TITLE)
+    axes[0].set_title(motion.problem.title, fontsize=11)
     for draw, ax in zip(parts, axes, strict=True):
         draw(motion, ax)
-        finish_axes(ax, False)
+        finish_axes(ax)
     return figure
 
 
 def _angles(motion: Simulation, ax: Axes) -> None:
     names = [m.name for m in motion.measures if not m.name.startswith("T_")]
-    bicycle = "phi" in motion.columns
-    _lines(motion, ax, names, 180 / np.pi if bicycle else 1.0)
-    ax.set_ylabel("angle in deg" if bicycle else "coordinate")
+    scale, label = (180 / np.pi, "angle in deg") if "phi" in motion.columns else (1.0, "coordinate")
+    _lines(motion, ax, names, scale, label)
     settled = np.max([m.settling for m in motion.measures])  # nan if one is
     if settled < motion["t"][-1]:
         ax.axvspan(settled, motion["t"][-1], color="0.93", zorder=0, label="settled within 2 %")
 
 
 def _torques(motion: Simulation, ax: Axes) -> None:
-    _lines(motion, ax, _TORQUES, 1.0)
-    ax.set_ylabel(f"torque in {motion.units['T_delta']}")
+    names = [n for n in ("T_phi", "T_delta") if n in motion.columns]
+    _lines(motion, ax, names, 1.0, f"torque in {motion.units['T_delta']}")
 
 
 def _path(motion: Simulation, ax: Axes) -> None:
-    for end, colour in zip(("rear", "front"), _COLOURS, strict=False):
-        ax.plot(motion["x"], motion[f"y_{end}"], color=colour, linewidth=1.2, label=f"{end} contact")
+    for end, colour in (("rear", CRITICAL), ("front", MARK)):
+        ax.plot(motion["x"], motion[f"y_{end}"], color=colour, label=f"{end} contact")
     ax.invert_yaxis()  # seen from above, ahead is to the right
     unit = motion.units["x"]
     ax.set(xlabel=f"way of the rear contact in {unit}", ylabel=f"to the right in {unit}")
 
 
-def _lines(motion: Simulation, ax: Axes, names: Sequence[str], scale: float) -> None:
-    for k, name in enumerate(n for n in names if n in motion.columns):
-        x, y, style = motion["t"], scale * np.asarray(motion[name]), "-" if k < 6 else "--"
-        ax.plot(x, y, style, color=_COLOURS[k % 6], linewidth=1.2, label=_LATEX.get(name, name))
-    ax.axhline(0, color="0.6", linewidth=0.6, zorder=0, label="_0")
-    ax.set_xlim(0, motion["t"][-1])
-    unit = motion.units.get("t", "")
-    ax.set_xlabel(f"time in {unit}" if unit else "time")
+def _lines(motion: Simulation, ax: Axes, names: Sequence[str], scale: float, label: str) -> None:
+    for k, name in enumerate(names):
+        style, y = "-" if k < 6 else "--", scale * np.asarray(motion[name])
+        ax.plot(motion["t"], y, style, color=_COLOURS[k % 6], label=_LATEX.get(name, name))
+    ax.axhline(0, color="0.6", linewidth=0.6, zorder=0)
+    unit = motion.units.get("t")
+    ax.set(xlim=(0, motion["t"][-1]), xlabel=f"time in {unit}" if unit else "time", ylabel=label)

@@ -30,11 +30,15 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
     More: docs/explanation/exceptional_points.md
     """
     rate, unit = 1.0, ""
+    if isinstance(data, Optimality):
+        of_H = any(root.eigenfrequency is not None for root in data.roots)
+    else:
+        of_H = bool(data.eigenfrequencies)
     if isinstance(data, Solution):
         if (of := data.problem.posed.parameter_set).rate is not None:
             rate, unit = float(of.rate(data.parameters)), " in 1/s"
         reach = f"rightmost at {rate * data.abscissa:.5g}{unit[3:]}"
-        if _of_H(data):
+        if of_H:
             reach = f"largest Im ω {max(w.im for w in data.eigenfrequencies):.5g}"
         title = f"{data.problem.title}\n{data.structure}, {reach}".strip()
     elif isinstance(data, Proof):
@@ -42,17 +46,16 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
         title = f"{data.claim}:\n" + (f"proved, {narrow}" if data.proved else "not proved")
     else:
         title = f"{data.goal or 'abscissa'}: {data.verdict}"
-    found = {(float(r.re), float(r.im)): r.multiplicity for r in data.roots}
-    own = ax is None
     ax = on_axes(ax, 4.6, 4.4)
     ax.set_title(title, fontsize=9.5)
     ax.axhline(0, color="grey", linewidth=0.6)
-    if _of_H(data):
-        found = {(0.0 - im, re): m for (re, im), m in found.items()}
+    roots = [(float(r.re), float(r.im), r.multiplicity) for r in data.roots]
+    if of_H:
+        found = {(0.0 - im, re): m for re, im, m in roots}
         problem = getattr(data, "problem", None)
         _frame_frequencies(ax, found, abs(problem.model.carrier or 1.0) if problem else 1.0)
     else:
-        found = {(rate * re, rate * im * side): m for (re, im), m in found.items() for side in (1, -1)}
+        found = {(rate * re, rate * im * side): m for re, im, m in roots for side in (1, -1)}
         size = max((math.hypot(*z) for z in found), default=1.0) * 1.3 or 1.0
         ax.axvspan(0, size, color="0.92", zorder=0)
         ax.axvline(0, color="grey", linewidth=0.6)
@@ -62,7 +65,7 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
         ax.plot(*place, "o" if m == 1 else "s", color=REAL if m == 1 else MARK, markersize=5 + m)
         if m > 1:
             note(ax, f"{m}-fold", place, (7, 7), fontsize=9)
-    return finish_axes(ax, own)
+    return finish_axes(ax)
 
 
 def _frame_frequencies(ax: Axes, found: Iterable[tuple[float, float]], scale: float) -> None:
@@ -71,20 +74,13 @@ def _frame_frequencies(ax: Axes, found: Iterable[tuple[float, float]], scale: fl
     Args:
         scale: of the problem: less than 1e-12 of it is 0 but for rounding.
     """
-    x, y = np.array([*found]).reshape(-1, 2).T
-    middle, low, high = float(np.mean(x)), min(0.0, *y), max(0.0, *y)
+    x, y = np.array([*found]).T
+    middle, low, high = np.mean(x), min(0.0, *y), max(0.0, *y)
     size = max(np.ptp(x), high - low)
     size = size if size > 1e-12 * scale else max(abs(middle), scale)
     ax.axhspan(0, high + size, color="0.92", zorder=0)
     ax.set(xlim=(middle - 0.8 * size, middle + 0.8 * size), ylim=(low - 0.3 * size, high + 0.3 * size))
     ax.set(xlabel=OF_H["imag"], ylabel=OF_H["real"])
-
-
-def _of_H(data: Solution | Proof | Optimality) -> bool:
-    """Whether roots are those of a complex system, which have no conjugates."""
-    if isinstance(data, Optimality):
-        return any(root.eigenfrequency is not None for root in data.roots)
-    return bool(data.eigenfrequencies)
 
 
 def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
@@ -101,10 +97,10 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
 
     More: docs/explanation/exceptional_points.md
     """
-    own = ax is None
-    place = f"pair at {data.re:.5g} ± {data.im:.5g}i" if data.im else f"root at {data.re:.5g}"
+    place, farthest = f"pair at {data.re:.5g} ± {data.im:.5g}i" if data.im else f"root at {data.re:.5g}", "root"
     if (omega := data.eigenfrequency) is not None:
-        place = f"eigenfrequency {f'{omega:.5g}'.replace('j', 'i') if omega else 0}"
+        farthest = "eigenfrequency"
+        place = f"{farthest} {f'{omega:.5g}'.replace('j', 'i') if omega else 0}"
     ax = on_axes(ax, 6.0, 4.4, f"{data.algebraic}-fold {place}, {data.kind}")
     for k, response in enumerate(data.responses):
         for law in response.laws[:1]:
@@ -113,6 +109,5 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
             label, style = rf"{response.parameter}: $\varepsilon^{{{power}}}$", "o" + _STYLES[k % 4]
             shift = law.branches.size * eps ** float(power)
             ax.loglog(eps, shift, style, color=_COLOURS[k % 5], label=label, markevery=[1], markersize=4)
-    farthest = "root" if omega is None else "eigenfrequency"
     ax.set(xlabel=r"change $\varepsilon$ of a parameter", ylabel=f"shift of the farthest {farthest}")
-    return finish_axes(ax, own)
+    return finish_axes(ax)

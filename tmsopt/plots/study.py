@@ -1,8 +1,6 @@
 """The rows of a study: a histogram of what was built, or the objective over what varies."""
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,42 +32,35 @@ def draw_histogram(data: Results, ax: Axes | None = None) -> Axes:
 
     More: docs/tutorials/study.md
     """
-    drawn = on_axes(ax, 6.4, 4.2)
-    title = data.study.title or data.study.problem.title
-    share = _drawn_around(drawn, data) if data.study.method == "monte_carlo" else _over_what_varies(drawn, data)
-    drawn.set_title("\n".join(filter(None, (title if ax is None else "", share))), fontsize=10)
-    return finish_axes(drawn, ax is None)
+    title = "" if ax else data.study.title or data.study.problem.title
+    ax = on_axes(ax, 6.4, 4.2)
+    share = (_drawn_around if data.study.method == "monte_carlo" else _over_what_varies)(ax, data)
+    ax.set_title(f"{title}\n{share}".strip(), fontsize=10)
+    return finish_axes(ax)
 
 
 def _drawn_around(ax: Axes, data: Results) -> str:
     problem, rows = data.study.problem, data.rows
-    rate, names = problem.posed.parameter_set.rate, problem.posed.parameter_set.names
-    values = rows.values("abscissa")
-    values = _convert_rate(values, {n: rows.values(header("parameters", n)) for n in names}, rate)
+    of = problem.posed.parameter_set
+    nominal = solve(problem, throw=False, interruptible=False)
+    values, at, words = rows.values("abscissa"), nominal.abscissa, abscissa_label(problem.posed)
+    if of.rate is not None:
+        values = -values * of.rate({n: rows.values(header("parameters", n)) for n in of.names})
+        at = -at * of.rate(nominal.parameters)
+        words = "decay rate in 1/s (negative: growth)"
     known, near = np.isfinite(values), _find_comparable(values)
     stable = rows.column("stable").filled(False)
-    nominal = solve(problem, throw=False, interruptible=False)
-    edges = _edges(values[near])
-    for chosen, colour, hatch, label in (
-        (stable & near, STABLE, "", "stable"),
-        (~stable & near, MARK, "//", "not stable"),
-    ):
-        if chosen.any():
-            ax.hist(values[chosen], edges, color=colour, edgecolor="white", hatch=hatch, linewidth=0.5, label=label)
-    at = float(_convert_rate(np.float64(nominal.abscissa), nominal.parameters, rate))
-    ax.axvline(at, color=LINE, linestyle="--", linewidth=1.2, label=f"nominal design, {at:.4g}")
-    ax.axvline(0, color=CAPSIZE, linewidth=1.4, label="0: neither decay nor growth")
-    words = abscissa_label(problem.posed) if rate is None else "decay rate in 1/s (negative: growth)"
+    for chosen, colour, hatch, label in (stable, STABLE, "", "stable"), (~stable, MARK, "//", "not stable"):
+        if (chosen & near).any():
+            shown, edges = values[chosen & near], _edges(values[near])
+            ax.hist(shown, edges, color=colour, edgecolor="white", hatch=hatch, linewidth=0.5, label=label)
+    ax.axvline(at, color=LINE, linestyle="--", label=f"nominal design, {at:.4g}")
+    ax.axvline(0, color=CAPSIZE, label="0: neither decay nor growth")
     ax.set(ylabel="designs", xlabel=words)
     counts = (known & ~near, "far beyond the axis"), (~known, "without roots")
     left_out = "".join(f", {np.count_nonzero(which)} {where}" for which, where in counts if which.any())
     share = f"{stable.sum()} of {len(stable)} stable ({100 * stable.mean():.3g} %)" if len(stable) else "no rows"
     return share + left_out
-
-
-def _convert_rate(abscissa: Any, parameters: Mapping[str, Any], rate: object) -> Any:
-    """The abscissa, or the decay rate in 1/s where there is a unit of time."""
-    return np.where(np.isfinite(abscissa), -abscissa * rate(parameters), abscissa) if callable(rate) else abscissa
 
 
 def _find_comparable(values: Array) -> Truth:
@@ -82,12 +73,9 @@ def _find_comparable(values: Array) -> Truth:
 
 def _edges(values: Array) -> list[float]:
     """Edges of bins, one of them 0 where values lie on both sides, so that no bin holds growth and decay."""
-    if not values.size:
-        return [0.0, 1.0]
-    low, high = float(values.min()), float(values.max())
+    low, high = values.min(), values.max()
     width = (high - low) / _BINS or 1e-3 * (abs(high) or 1.0)
-    first = math.floor(low / width)
-    return [width * k for k in range(first, math.floor(high / width) + 2)]
+    return [width * k for k in range(math.floor(low / width), math.floor(high / width) + 2)]
 
 
 def _over_what_varies(ax: Axes, data: Results) -> str:
@@ -104,7 +92,7 @@ def _over_what_varies(ax: Axes, data: Results) -> str:
         drawn = ax.scatter(x, y, c=colours[0], s=26, cmap="cividis", edgecolors="0.3")
         figure_of(ax).colorbar(drawn, ax=ax, label=axes[1].label)
     else:
-        ax.plot(x, y, "o-" if study.method == "grid" else "o", color=CRITICAL, markersize=3.5, linewidth=0.8)
+        ax.plot(x, y, "o-" if study.method == "grid" else "o", color=CRITICAL, markersize=3.5)
     ax.set(xlabel=axes[0].label if axes else "row", ylabel=scale.label)
     ax.xaxis.set_major_locator(MaxNLocator(6))
     return f"{np.count_nonzero(found)} of {len(found)} rows {status_text(problem, 'optimal')}"

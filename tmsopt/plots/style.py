@@ -27,7 +27,7 @@ EDGE: dict[str, Any] = {"markeredgecolor": "black", "markeredgewidth": 0.6}
 """Of filled markers."""
 
 _ENTRY = 2.6  # inches of a legend entry
-_TITLE = 11
+_OWN = "own"  # label of Axes in a figure of their own, which has its legend below
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -47,10 +47,10 @@ def new_figure(width: float, height: float) -> Figure:
 
 def on_axes(ax: Axes | None, width: float, height: float, title: str = "") -> Axes:
     """The Axes given, or those of a new figure with a title."""
-    if ax is not None:
-        return ax
-    ax = new_figure(width, height).subplots()
-    ax.set_title(title, fontsize=_TITLE)
+    if ax is None:
+        ax = new_figure(width, height).subplots()
+        ax.set(label=_OWN)
+        ax.set_title(title, fontsize=11)
     return ax
 
 
@@ -60,26 +60,31 @@ def figure_of(ax: Axes) -> Figure:
     return figure
 
 
+def draw_legend(ax: Axes, handles: Sequence[Artist]) -> None:
+    """The legend of Axes, in a figure of their own below it."""
+    if ax.get_label() == _OWN:
+        legend_below(figure_of(ax), handles)
+    else:
+        _legend(ax, handles, fontsize=7, framealpha=0.9)
+
+
 def legend_below(figure: Figure, handles: Sequence[Artist], columns: int | None = None) -> None:
-    """One legend for the whole figure, below it, where it covers nothing; each label once."""
-    once = {str(h.get_label()): h for h in handles}
-    if once:
-        beside = columns or min(len(once), int(figure.get_figwidth() / _ENTRY))
-        figure.legend(handles=list(once.values()), loc="outside lower center", ncols=beside, fontsize=8, frameon=False)
+    """One legend for the whole figure, below it, where it covers nothing."""
+    columns = columns or int(figure.get_figwidth() / _ENTRY)
+    _legend(figure, handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False)
 
 
-def draw_bands(
-    ax: Axes,
-    stable: ArrayLike,
-    heavily_damped: ArrayLike,
-    alphas: tuple[float, float] = (0.18, 0.35),
-    top: float = 1,
-) -> None:
-    """Bands of stability and of heavy damping, up to a part of the height."""
-    kinds = (stable, STABLE, "stable"), (heavily_damped, HEAVY, "heavily damped")
-    for (bands, colour, words), alpha in zip(kinds, alphas, strict=True):
-        for k, (low, high) in enumerate(np.reshape(bands, (-1, 2))):
-            ax.axvspan(low, high, 0, top, color=colour, alpha=alpha, linewidth=0, label=None if k else words)
+def _legend(place: Axes | Figure, handles: Sequence[Artist], **look: Any) -> None:
+    """A legend that has each label once."""
+    if once := {str(h.get_label()): h for h in handles}:
+        place.legend(handles=list(once.values()), **look)
+
+
+def draw_bands(ax: Axes, stable: ArrayLike, heavily_damped: ArrayLike) -> None:
+    """Bands of stability and of heavy damping."""
+    for bands, colour, words in (stable, STABLE, "stable"), (heavily_damped, HEAVY, "heavily damped"):
+        for low, high in np.reshape(bands, (-1, 2)):
+            ax.axvspan(low, high, color=colour, alpha=0.25, linewidth=0, label=words)
 
 
 def entry(label: str, color: str, style: LineStyleType = "-", **look: Any) -> Artist:
@@ -87,24 +92,16 @@ def entry(label: str, color: str, style: LineStyleType = "-", **look: Any) -> Ar
     return Line2D([], [], color=color, linestyle=style, label=label, **look)
 
 
-def note(ax: Axes, text: str, place: ArrayLike, offset: tuple[float, float], **look: Any) -> None:
+def note(ax: Axes, text: str, place: Any, offset: tuple[float, float], **look: Any) -> None:
     """A text beside a point, by an offset in points."""
     look = {"fontsize": 8, "horizontalalignment": "right" if offset[0] < 0 else "left", **look}
-    ax.annotate(text, tuple(np.asarray(place)), offset, textcoords="offset points", **look)
+    ax.annotate(text, place, offset, textcoords="offset points", **look)
 
 
-def arrow(
-    ax: Axes,
-    start: ArrayLike,
-    end: ArrayLike,
-    head: tuple[float, float] = (0.25, 0.5),
-    zorder: float = 4,
-    **look: Any,
-) -> None:
-    """An arrow from point to point, its head (width, length) in parts of a letter."""
-    style = "-|>,head_width={},head_length={}".format(*head)
-    arrowprops = {"arrowstyle": style, "shrinkA": 0, "shrinkB": 0, **look}
-    ax.annotate("", tuple(np.asarray(end)), tuple(np.asarray(start)), arrowprops=arrowprops, zorder=zorder)
+def arrow(ax: Axes, start: Any, end: Any, **look: Any) -> None:
+    """An arrow from point to point."""
+    style = "-|>,head_width=0.25,head_length=0.5"
+    ax.annotate("", end, start, arrowprops={"arrowstyle": style, "shrinkA": 0, "shrinkB": 0, **look})
 
 
 def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:

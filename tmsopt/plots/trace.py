@@ -12,20 +12,11 @@ from tmsopt.plots.labels import Name, PlaneAxes, abscissa_label, finish_axes, pl
 from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, figure_of, on_axes
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 
-COLOURS = {
-    "EP4": MARK,
-    "EP3": MARK,
-    "2EP2": REAL,
-    "CEP2": COMPLEX,
-    "EP2": LINE,
-    "weave": CRITICAL,
-    "capsize": CAPSIZE,
-    "resonance": COMPLEX,
-}
-"""Colour of each pattern; complex ones are dashed besides."""
+_COLOURS = {"EP2": LINE, "weave": CRITICAL, "capsize": CAPSIZE, "resonance": COMPLEX}
+"""Colours of patterns that are no higher roots; complex ones are dashed besides."""
 
 _UNLABELLED = ("fold", "constraint", "end")
-_BANDS = {True: 6.0, False: 2.5}
+_BANDS = 6.0, 2.5
 """Width of the coloured band along what is stable, and what is not."""
 
 
@@ -44,17 +35,16 @@ def draw_trace(data: Trace, ax: Axes | None = None, horizontal: str | None = Non
     """
     plane = plane_over(data.problem.posed, horizontal, vertical, *data.varying, *data.problem.free)
     model = data.problem.model
-    drawn = on_axes(ax, 6.4, 5.0, data.problem.title or in_words_of(model, data.pattern))
-    _bands(drawn, data, plane)
+    ax = on_axes(ax, 6.4, 5.0, data.problem.title or in_words_of(model, data.pattern))
+    _bands(ax, data, plane)
     for branch in data.branches:
-        draw_branch(drawn, branch, plane, width=1.2, tint=LINE, model=model)
-    names = [
-        Name(in_words_of(model, e.name), *plane.to_axis(e.parameters)) for e in data.events if e.name not in _UNLABELLED
-    ]
+        draw_branch(ax, branch, plane, width=1.2, tint=LINE, model=model)
+    events = [e for e in data.events if e.name not in _UNLABELLED]
+    names = [Name(in_words_of(model, e.name), *plane.to_axis(e.parameters)) for e in events]
     for name in names:
-        drawn.plot(name.x, name.y, "o", color=MARK, markeredgecolor="white", markersize=5, zorder=4)
-    plane.label(drawn)
-    return finish_axes(drawn, ax is None, names)
+        ax.plot(name.x, name.y, "o", color=MARK, markeredgecolor="white", zorder=4)
+    plane.label(ax)
+    return finish_axes(ax, names)
 
 
 def draw_branch(
@@ -66,29 +56,28 @@ def draw_branch(
         model: in whose words.
     """
     points = plane.to_axis(branch.parameters)
-    states = list(zip(kinds_along(branch), branch.stable.tolist(), branch.satisfied.tolist(), strict=True))
-    events = {e.index for e in branch.events}
-    start, said = 0, {True: (), False: ("constraint violated",)}
+    states = zip(kinds_along(branch), branch.stable, branch.satisfied, strict=True)
+    events, start = {e.index for e in branch.events}, 0
     for (kind, stable, satisfied), run in groupby(states):
         stop = start + len(list(run))
         first = start - (start - 1 in events)
         end = stop + (stop - 1 not in events)  # no gap: an event belongs to both of its sides
-        label = ", ".join([in_words_of(model, kind), *["unstable"] * (not stable), *said[satisfied]])
+        words = in_words_of(model, kind), *["unstable"] * (not stable), *["constraint violated"] * (not satisfied)
         ax.plot(
             *points[:, first:end],
             "--" if kind.startswith("CEP") else "-" if satisfied else ":",
             color=tint or colour(kind),
             linewidth=width if satisfied else width / 2,
             alpha=1.0 if stable else 0.35,
-            label=None if label in ax.get_legend_handles_labels()[1] else label,
+            label=", ".join(words),
         )
         start = stop
 
 
 def colour(kind: str) -> str:
     """Colour of a pattern of any degree: one for all higher roots, for several real ones, and for complex pairs."""
-    if kind in COLOURS:
-        return COLOURS[kind]
+    if kind in _COLOURS:
+        return _COLOURS[kind]
     return COMPLEX if "CEP" in kind else REAL if "+" in kind or kind[0].isdigit() else MARK
 
 
@@ -107,16 +96,15 @@ def trace_figure(trace: Trace, horizontal: str | None = None, vertical: str | No
 
 def _bands(ax: Axes, data: Trace, plane: PlaneAxes) -> None:
     """Segments coloured by the abscissa of their ends, with the colour bar."""
-    segments, values, widths = [], [], []
+    pieces = []
     for branch in data.branches:
-        points = plane.to_axis(branch.parameters).T
-        segments.append(np.stack([points[:-1], points[1:]], axis=1))
-        values.append((branch.abscissa[:-1] + branch.abscissa[1:]) / 2)
-        widths += [_BANDS[bool(s)] for s in branch.stable[:-1] & branch.stable[1:]]
-    if segments:
-        drawn = LineCollection(
-            [*np.concatenate(segments)], cmap="cividis", linewidths=widths, capstyle="projecting", zorder=1
-        )
-        drawn.set_array(np.concatenate(values))
+        points, stable = plane.to_axis(branch.parameters).T, branch.stable
+        middle = (branch.abscissa[:-1] + branch.abscissa[1:]) / 2
+        pieces.append((np.stack([points[:-1], points[1:]], axis=1), middle, stable[:-1] & stable[1:]))
+    if pieces:
+        segments, values, inner = (np.concatenate(column) for column in zip(*pieces, strict=True))
+        widths = np.where(inner, *_BANDS)
+        drawn = LineCollection([*segments], array=values, linewidths=widths, capstyle="projecting", zorder=1)
+        drawn.set_cmap("cividis")
         ax.add_collection(drawn)
         figure_of(ax).colorbar(drawn, ax=ax, label=abscissa_label(data.problem.posed))

@@ -7,13 +7,16 @@ Item with it. The module is imported when the figure is made, so that listing th
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tmsopt.executor import Crash, cores, here, processes
 from tmsopt.records import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+_LOOK: Any = {"axes.titlesize": 9.5, "legend.fontsize": 7.5, "legend.title_fontsize": 7.5, "legend.framealpha": 0.9}
+"""Settings of Matplotlib for every figure."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,10 @@ class Item:
 
     def make(self) -> "Figure":
         """The figure, its data computed anew."""
-        made: Figure = getattr(import_module("tmsopt.plots.paper"), f"{self.name.replace('-', '_')}_figure")()
+        from matplotlib import rc_context
+
+        with rc_context(_LOOK):
+            made: Figure = getattr(import_module("tmsopt.plots.paper"), f"{self.name.replace('-', '_')}_figure")()
         return made
 
 
@@ -44,11 +50,10 @@ def find(name: str) -> Item:
     """
     from tmsopt.errors import input_error, suggest
 
-    for item in GALLERY.values():
-        if name in (item.name, item.alias):
-            return item
-    accepted = [*GALLERY, *(item.alias for item in GALLERY.values() if item.alias)]
-    raise input_error(f"found '{name}'; {suggest(name, accepted)}", "NAME")
+    named = {key: item for item in GALLERY.values() for key in (item.name, item.alias) if key}
+    if name not in named:
+        raise input_error(f"found '{name}'; {suggest(name, named)}", "NAME")
+    return named[name]
 
 
 _ITEMS = (

@@ -1,17 +1,15 @@
 """Root loci in the complex plane, drawn into Axes that the caller made."""
 
-from itertools import cycle
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tmsopt.dynamics import Growth
 from tmsopt.paper.locus import FR_MAX, LocusRow, multiple_roots, table_1_loci
-from tmsopt.plots.style import COMPLEX, CRITICAL, EDGE, LINE, MARK, REAL, arrow, entry, legend_below, new_figure, note
-from tmsopt.records import Array, Complex
+from tmsopt.plots.labels import Name, place_all
+from tmsopt.plots.style import COMPLEX, CRITICAL, EDGE, LINE, MARK, REAL, arrow, entry, legend_below, new_figure
+from tmsopt.records import Array
 
 _CURVES = ((LINE, 1.5), (CRITICAL, 1.0), (MARK, 1.0))
 """Colour and width at χ_B of the law, below it, above it."""
@@ -19,69 +17,64 @@ _CURVES = ((LINE, 1.5), (CRITICAL, 1.0), (MARK, 1.0))
 NAMES = {"EP4": r"$\mathrm{EP}_4$", "2EP2": r"$2\mathrm{EP}_2$", "CEP2": r"$\mathrm{CEP}_2$", "EP2": r"$\mathrm{EP}_2$"}
 """Multiple roots in the symbols of the paper."""
 
-_PLACES = {"EP4": ((-34, 9),), "2EP2": ((22, 26), (1, 33)), "CEP2": ((10, -17), (10, 12)), "EP2": ((6, -13),)}
-"""Where the names stand beside the roots, in points, by ascending real and imaginary part."""
-
-_LEADER = {"arrowstyle": "-", "linewidth": 0.5, "color": "0.3", "shrinkA": 0, "shrinkB": 3}
-"""From a multiple root to a name that stands off."""
-
-_CIRCLE: dict[str, Any] = {"color": "0.55", "linewidth": 3.5, "alpha": 0.45}
-_CROSSING: dict[str, Any] = {"markersize": 4.5, "markerfacecolor": "white", "markeredgecolor": LINE}
-
 Window = Array
 """Left, right, low and high."""
 
 
-def draw_row(ax: Axes, row: LocusRow, window: Window, arrows: int) -> None:
-    """The three loci of one steer axis tilt with the circle |s| = |ω0|, inside a window."""
-    omega0 = row.bicycle.omega0
-    ax.axhline(0, color="0.75", linewidth=0.6, zorder=0)
-    ax.axvline(0, color="0.4", linewidth=0.8, zorder=0)
-    circle = abs(omega0) * np.exp(1j * np.linspace(0, 2 * np.pi, 361))
-    ax.plot(circle.real, circle.imag, zorder=0.5, gid="circle", **_CIRCLE)
+def draw_row(ax: Axes, row: LocusRow, window: Window, arrows: int) -> list[Name]:
+    """The three loci of one steer axis tilt with the circle |s| = |ω0|, inside a window; names of multiple roots."""
+    size, law = abs(row.bicycle.omega0), row.loci[0]
+    ax.axhline(0, color="0.75", linewidth=0.6)
+    ax.axvline(0, color="0.4", linewidth=0.8)
+    angle = np.linspace(0, 2 * np.pi, 361)
+    label = rf"$|s| = |\omega_0| = {size:.4f}$"
+    ax.plot(size * np.cos(angle), size * np.sin(angle), "0.8", linewidth=3.5, gid="circle", label=label)
     ax.set(xlim=window[:2], ylim=window[2:], aspect="equal")
     for data, (colour, width) in reversed([*zip(row.loci, _CURVES, strict=True)]):
-        tracks = [s for m in data.modes for s in ([m.roots, m.roots.conj()] if m.roots.imag.any() else [m.roots])]
-        for s in tracks:
-            ax.plot(s.real, s.imag, color=colour, linewidth=width, solid_capstyle="round", gid="track")
-            _arrows(ax, s, colour, 2 if colour == LINE else arrows)
-    _marks(ax, row.loci[0], omega0)
+        for mode in data.modes:
+            for side in (1, -1) if mode.roots.imag.any() else (1,):
+                track = np.stack([mode.roots.real, side * mode.roots.imag], axis=1)
+                ax.plot(*track.T, color=colour, linewidth=width, gid="track")
+                draw_arrows(ax, track, 2 if data is law else arrows, colour)
+    names = []
+    for name, _, s in multiple_roots(law):
+        colour, kind = (COMPLEX, "complex double") if s.imag else (REAL, "real multiple")
+        label = rf"{kind} root, $\chi_B = \sqrt{{2}}$"
+        ax.plot(
+            s.real, s.imag, "o", color=colour, zorder=5, gid=name, label=kind + r" root, $\chi_B = \sqrt{2}$", **EDGE
+        )
+        on_circle = name == "EP2" and abs(abs(s.real) - size) < 1e-6
+        text = (r"$-\omega_0$" if s.real > 0 else r"$\omega_0$") if on_circle else NAMES[name]
+        names.append(Name(text, s.real, s.imag))
+    for y in (event.root.im for event in law.events if event.changes):
+        label = r"$\mathrm{Fr} = \mathrm{Fr}_c$, $\chi_B = \sqrt{2}$"
+        ax.plot([0, 0], [y, -y], "D", markersize=4.5, mfc="white", color=LINE, zorder=5, gid="crossing", label=label)
+    return names
 
 
 def root_locus_figure() -> Figure:
     """The whole complex plane beside an enlargement around the exceptional points, a row per steer axis tilt."""
     rows = table_1_loci()
     figure = new_figure(7.4, 3.05 * len(rows) + 0.4)
-    axes = figure.subplots(len(rows), 2)
+    axes, names = figure.subplots(len(rows), 2), list[tuple[Axes, Sequence[Name]]]()
     for (left, right), row, letter in zip(axes, rows, "abc", strict=True):
         near = _zoom_window(row)
-        draw_row(left, row, full_window(row), 1)
-        draw_row(right, row, near, 2)
-        left.plot(near[[0, 1, 1, 0, 0]], near[[2, 2, 3, 3, 2]], ":", color="0.4", linewidth=0.7, zorder=4)
+        names += [(left, draw_row(left, row, full_window(row), 1)), (right, draw_row(right, row, near, 2))]
+        left.plot(near[[0, 1, 1, 0, 0]], near[[2, 2, 3, 3, 2]], ":", color="0.4", linewidth=0.7)
         name, tilt = row.bicycle.name, row.bicycle.parameters["lambda_s"]
         offset = {"2EP2": " - 0.05", "CEP2": " + 0.8"}.get(name, "")
         exact = r"\arctan(\frac{15}{4} - \frac{75}{32}\sqrt{2})"
-        left.set_title(rf"({letter}) $\lambda_s = {exact}{offset} = {tilt:.4f}$ rad", fontsize=9)
-        at = rf"$\mathrm{{Fr}} = {row.loci[0].design:.6g}$"
-        right.set_title(f"enlarged: {NAMES[name]} at {at}", fontsize=9)
-        left.set_ylabel(r"$\mathrm{Im}\,s$")
+        left.set(title=rf"({letter}) $\lambda_s = {exact}{offset} = {tilt:.4f}$ rad", ylabel=r"$\mathrm{Im}\,s$")
+        right.set_title(rf"enlarged: {NAMES[name]} at $\mathrm{{Fr}} = {row.loci[0].design:.6g}$")
         shifts = "", f" - {row.offset:g}", f" + {row.offset:g}"
-        left.legend(
-            handles=[
-                entry(rf"$\sqrt{{2}}{shift}$", colour, linewidth=width + 0.3)
-                for shift, (colour, width) in zip(shifts, _CURVES, strict=True)
-            ],
-            loc="upper right",
-            title=r"$\chi_B$",
-            fontsize=6.5,
-            title_fontsize=7.5,
-            labelspacing=0.25,
-            handlelength=1.4,
-            borderpad=0.3,
-        )
+        handles = [entry(rf"$\sqrt{{2}}{shift}$", colour) for shift, (colour, _) in zip(shifts, _CURVES, strict=True)]
+        left.legend(handles=handles, loc="upper right", title=r"$\chi_B$", handlelength=1.4)
     for ax in axes[-1]:
         ax.set_xlabel(r"$\mathrm{Re}\,s$")
-    legend_below(figure, _key(rows[0].bicycle.omega0), 3)
+    key = [handle for ax in axes.flat for handle in ax.get_legend_handles_labels()[0]]
+    key.append(entry(rf"$\mathrm{{Fr}}$ increases from 0 to {FR_MAX:g}", LINE, marker=">"))
+    legend_below(figure, key, 3)
+    place_all(names)
     return figure
 
 
@@ -100,51 +93,12 @@ def _zoom_window(row: LocusRow) -> Window:
     return np.array([middle - half, middle + half, y.max() - tall, y.max() + tall])
 
 
-def _key(omega0: float) -> list[Artist]:
-    dot: dict[str, Any] = {"style": "none", "marker": "o", "markersize": 6, **EDGE}
-    return [
-        entry(rf"$|s| = |\omega_0| = {abs(omega0):.4f}$", **_CIRCLE),
-        entry(r"real multiple root, $\chi_B = \sqrt{2}$", REAL, **dot),
-        entry(r"complex double root, $\chi_B = \sqrt{2}$", COMPLEX, **dot),
-        entry(r"$\mathrm{Fr} = \mathrm{Fr}_c$, $\chi_B = \sqrt{2}$", LINE, "none", marker="D", **_CROSSING),
-        entry(rf"$\mathrm{{Fr}}$ increases from 0 to {FR_MAX:g}", LINE, marker=">", markersize=5),
-    ]
-
-
-def _marks(ax: Axes, data: Growth, omega0: float) -> None:
-    """The multiple roots of one locus by name, drawn inside the axes alone, and its crossings of the imaginary axis."""
-    found = sorted(multiple_roots(data), key=lambda mark: (mark[2].real, mark[2].imag))
-    for name, places in _PLACES.items():
-        for s, offset in zip([s for own, _, s in found if own == name], cycle(places), strict=False):
-            ax.plot(s.real, s.imag, "o", color=COMPLEX if s.imag else REAL, markersize=6, zorder=5, gid=name, **EDGE)
-            circle = name == "EP2" and abs(abs(s.real) - abs(omega0)) < 1e-6
-            note(
-                ax,
-                (r"$-\omega_0$" if s.real > 0 else r"$\omega_0$") if circle else NAMES[name],
-                (s.real, s.imag),
-                offset,
-                fontsize=8.5,
-                zorder=6,
-                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
-                arrowprops=_LEADER if np.hypot(*offset) > 20 else None,
-            )
-    for event in data.events:
-        if event.changes:
-            y = event.root.im
-            ax.plot([0, 0], [y, -y], "D", zorder=5, gid="crossing", **_CROSSING)
-
-
-def _arrows(ax: Axes, s: Complex, colour: str, count: int) -> None:
-    """Arrow heads spread evenly over the part of a track that the window shows, none on a short track."""
-    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-    size = np.hypot(right - left, high - low)
-    middle = (s[1:] + s[:-1]) / 2
-    seen = (middle.real > left) & (middle.real < right) & (middle.imag > low) & (middle.imag < high)
-    length = np.cumsum(np.where(seen, np.abs(np.diff(s)), 0.0))
-    if length.size == 0 or length[-1] < 0.09 * size:
-        return
-    number = count if length[-1] > 0.3 * size else 1
-    for fraction in (np.arange(number) + 0.5) / number:
-        k = int(np.searchsorted(length, fraction * length[-1]))
-        start, end = s[max(k - 1, 0)], s[min(k + 1, len(s) - 1)]
-        arrow(ax, (start.real, start.imag), (end.real, end.imag), (0.22, 0.45), color=colour, linewidth=0.8)
+def draw_arrows(ax: Axes, points: Array, count: int, colour: str) -> None:
+    """Arrow heads spread evenly over the part of a curve that the axes show, none on a short one."""
+    low, high = np.transpose([ax.get_xlim(), ax.get_ylim()])
+    seen = np.all((points[1:] > low) & (points[1:] < high), axis=1)
+    length = np.cumsum(seen * np.linalg.norm(np.diff(points, axis=0) / (high - low), axis=1))
+    if length.size and length[-1] > 0.12:
+        count = count if length[-1] > 0.4 else 1
+        for k in np.searchsorted(length, length[-1] * (np.arange(count) + 0.5) / count):
+            arrow(ax, points[k], points[k + 1], color=colour)
