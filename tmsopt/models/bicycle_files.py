@@ -7,14 +7,14 @@ comment. YAML files have the numbers under ``values:``, or at the top level. The
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
 
 from tmsopt.errors import Fault, InputError, escape_unprintable, limit_advice, short, suggest
 from tmsopt.files import as_path, read_text, write_text
 from tmsopt.models.bicycles.whipple import whipple
-from tmsopt.records import Table
+from tmsopt.records import Numbers, Table
 
 _SI = whipple.sets[0]
 _FILE_NAMES = {p.name: "lam" if p.name == "lambda_s" else p.name.replace("_", "") for p in _SI.parameters}
@@ -134,7 +134,7 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     )
 
 
-def write_bicycle(bicycle: Bicycle | Mapping[str, float], path: str | PathLike[str]) -> None:
+def write_bicycle(bicycle: Bicycle | Numbers, path: str | PathLike[str]) -> None:
     """Write a bicycle, or the parameters of a ``whipple`` design, as a BicycleParameters file.
 
     The ending of the name selects the format: ``.txt`` and ``.ini`` text, ``.yml`` and ``.yaml`` YAML, which has no

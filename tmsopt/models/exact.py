@@ -16,7 +16,7 @@ from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.errors import Fault, InputError, short, suggest, table_faults
 from tmsopt.models.expression import parse_value
 from tmsopt.models.model import Model, ParameterSet
-from tmsopt.records import Table
+from tmsopt.records import AnyNumbers, Numbers, Table
 
 SAME = 4e-15
 """Accepted relative difference of an exact value from the double of the design: a few roundings, also of a tangent."""
@@ -194,8 +194,8 @@ class ExactDesign:
 
 def as_exact_design(
     parameter_set: ParameterSet,
-    parameters: Mapping[str, float],
-    stated: Mapping[str, Any] | None = None,
+    parameters: Numbers,
+    stated: AnyNumbers | None = None,
     typed: Mapping[str, str] = MappingProxyType({}),
 ) -> ExactDesign:
     """The exact design of doubles: each is the decimal that prints it, unless an exact number is given.

@@ -6,7 +6,7 @@ import math
 import re
 import threading
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache, partial, reduce
@@ -21,6 +21,7 @@ from tmsopt.errors import short, suggest
 from tmsopt.models.advice import advice, call_advice
 from tmsopt.models.names import CONSTANTS, FUNCTIONS, UNSUPPORTED
 from tmsopt.models.stated.degree import DEGREES, Degree, DegreeTooHigh
+from tmsopt.records import AnyNumbers
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 _BINARY = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.Pow: "pow"}
@@ -82,7 +83,7 @@ class Expression:
     comparison: str = ""
     formula: Formula = field(default=Formula((), (), ()), repr=False, compare=False)
 
-    def __call__(self, values: Mapping[str, Any]) -> Any:
+    def __call__(self, values: AnyNumbers) -> Any:
         """The value for numbers of any kind; for a comparison, left minus right.
 
         Numbers in the text are exact fractions, and pi is π. A ball is nan where the value may not exist.
@@ -90,22 +91,22 @@ class Expression:
         left, *right = self.sides(values)
         return left - right[0] if right else left
 
-    def sides(self, values: Mapping[str, Any]) -> tuple[Any, ...]:
+    def sides(self, values: AnyNumbers) -> tuple[Any, ...]:
         """Both sides of a comparison, or the one value."""
         return tuple(float(x) if isinstance(x, np.float64) else x for x in kinds.values(self.formula, values))
 
-    def difference(self, values: Mapping[str, Any], limit: Any) -> Any:
+    def difference(self, values: AnyNumbers, limit: Any) -> Any:
         """Left minus right, with `limit` in place of the constant side."""
         numbers = [self.formula.steps[k].op == CONSTANT for k in self.formula.outputs]
         left, right = (limit if is_number else x for x, is_number in zip(self.sides(values), numbers, strict=True))
         return left - right
 
-    def of(self, values: Mapping[str, Any], kind: Kind) -> Any:
+    def of(self, values: AnyNumbers, kind: Kind) -> Any:
         """The value, or left minus right, in numbers of one kind."""
         left, *right = fold(self.formula, values, kind)
         return kind.operations["sub"](left, right[0]) if right else left
 
-    def violation(self, values: Mapping[str, Any]) -> float:
+    def violation(self, values: AnyNumbers) -> float:
         """Violation of a comparison at a numeric design, relative to the size of its sides; nan if undefined."""
         left, right = self.sides(values)
         difference = left - right

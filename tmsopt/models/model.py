@@ -15,14 +15,14 @@ import numpy as np
 from tmsopt.algebra.balls import as_ball
 from tmsopt.algebra.formula import Formula, fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS, kind_of
-from tmsopt.records import Table
+from tmsopt.records import AnyNumbers, Numbers, Table
 
 _BITS = 106  # precision of balls, whose radii then come from the roundings of the parameters alone
 _EPSILON = 2.0**-53
 _NEGLIGIBLE = 1e-9  # of a range: a smaller parameter counts as 0
 _PAGE = 3000  # most characters of a formula in LaTeX
 
-NumberFunction = Callable[[Mapping[str, Any]], Any]
+NumberFunction = Callable[[AnyNumbers], Any]
 """Function of named numbers that uses ``+ - * /`` and the operations of `tmsopt.algebra.kinds`, so it can be traced."""
 
 Matrix = list[list[Any]]
@@ -150,7 +150,7 @@ class Quantity:
     meaning: str
     latex: str
     value: NumberFunction
-    equation: Callable[[Mapping[str, Any], Any], Any] | None = None
+    equation: Callable[[AnyNumbers, Any], Any] | None = None
     range: Range = Range()
     pieces: tuple[NumberFunction, ...] = ()
     counterpart: "Quantity | None" = None
@@ -212,7 +212,7 @@ class ParameterSet:
 
     name: str
     parameters: tuple[Parameter, ...]
-    native: Callable[[Mapping[str, Any]], dict[str, Any]]
+    native: Callable[[AnyNumbers], dict[str, Any]]
     quantities: tuple[Quantity, ...] = ()
     rate: NumberFunction | None = None
     root_unit: str = "1"
@@ -270,15 +270,15 @@ class Model:
     title: str
     degree: int
     sets: tuple[ParameterSet, ...]
-    algebraic: Callable[[Mapping[str, Any]], dict[str, Any]]
+    algebraic: Callable[[AnyNumbers], dict[str, Any]]
     polynomial: Callable[..., list[Any]]
     quantities: tuple[Quantity, ...] = ()
     compact: Callable[..., list[Any]] | None = None
-    pencil: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = None
-    feedback: Callable[[Mapping[str, Any]], Feedback] | None = None
+    pencil: Callable[[AnyNumbers], tuple[Matrix, ...]] | None = None
+    feedback: Callable[[AnyNumbers], Feedback] | None = None
     natural: bool = False
     origin: tuple[Callable[..., "Model"], tuple[Any, ...]] | None = None
-    statement: Mapping[str, Any] | None = None
+    statement: AnyNumbers | None = None
     numbers: tuple[str, ...] = ()
     words: tuple[str, str] = ("flutter", "divergence")
     omits: str = ""
@@ -287,7 +287,7 @@ class Model:
     absent: Mapping[str, str] = Table()
     carrier: float | None = None
     carried: Callable[[Mapping[str, tuple[float, float]]], "Model"] | None = None
-    double: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = None
+    double: Callable[[AnyNumbers], tuple[Matrix, ...]] | None = None
 
     def __repr__(self) -> str:
         return f"Model(name={self.name!r}, title={self.title!r}, degree={self.degree}, natural={self.natural})"
@@ -298,11 +298,11 @@ class Model:
         is_unchanged = origin and (origin[0] is not resolve_name or resolve_name(*origin[1]) is self)
         return origin if is_unchanged else super().__reduce_ex__(protocol)
 
-    def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
+    def coefficients(self, parameters: AnyNumbers, of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for numbers of any kind: floats, arrays, CasADi, balls."""
         return self.computed(of or self.sets[0], parameters)[1]
 
-    def computed(self, of: ParameterSet, parameters: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
+    def computed(self, of: ParameterSet, parameters: AnyNumbers) -> tuple[dict[str, Any], list[Any]]:
         """Native parameters and coefficients for numbers of any kind."""
         kind, native = kind_of(*parameters.values()), self.sets[0].names
         with np.errstate(all="ignore"):
@@ -402,10 +402,10 @@ class Values(Mapping[str, Any]):
         self,
         model: Model,
         of: ParameterSet,
-        parameters: Mapping[str, Any],
+        parameters: AnyNumbers,
         extra: Iterable[Quantity] = (),
         lift: Callable[[Quantity, "Values"], Any] | None = None,
-        ranges: Mapping[str, float] | None = None,
+        ranges: Numbers | None = None,
     ) -> None:
         native, self.coefficients = model.computed(of, parameters)
         self.model, self.kind = model, kind_of(*parameters.values())
@@ -427,7 +427,7 @@ class Values(Mapping[str, Any]):
             self._found[name] = value
         return self._found[name]
 
-    def fold(self, formula: Formula, own: Mapping[str, Any] = MappingProxyType({})) -> list[Any]:
+    def fold(self, formula: Formula, own: AnyNumbers = MappingProxyType({})) -> list[Any]:
         """Outputs of a formula in these values and those of `own`; unknown quantities of the roots are nan."""
         unknown = dict.fromkeys(ROOTS, np.nan)
         known = {n: own[n] if n in own else self[n] if n in self else unknown[n] for n in formula.inputs}
@@ -444,7 +444,7 @@ class Values(Mapping[str, Any]):
             found = model.coefficients(balls, of)
         return [float(c.rad()) if c.is_finite() else np.inf for c in found]
 
-    def with_known(self, known: Mapping[str, Any]) -> "Values":
+    def with_known(self, known: AnyNumbers) -> "Values":
         """Values of the same design, with given numbers in place of some formulas."""
         other = copy(self)
         other._known, other._found = {**self._known, **known}, {}

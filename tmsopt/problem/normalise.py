@@ -9,6 +9,7 @@ from tmsopt.models import Model, controlled
 from tmsopt.problem.cases import Scenario, middle_of, parse_scenario, points_of
 from tmsopt.problem.units import TABLES, read_numbers
 from tmsopt.problem.validate import find_faults, guess_parameter_set, shape_faults
+from tmsopt.records import Numbers
 
 _POINT = 1e-12
 """A range narrower than this, relative to its ends, is a single value."""
@@ -48,9 +49,9 @@ def normalise(**stated: Any) -> dict[str, Any]:
 
 def complete_fields(
     model: Model,
-    fixed: Mapping[str, float],
+    fixed: Numbers,
     free: Mapping[str, tuple[float, float]],
-    start: Mapping[str, float],
+    start: Numbers,
     **others: Any,
 ) -> dict[str, Any]:
     """The fields of a problem from valid numbers and texts.
@@ -67,10 +68,10 @@ def complete_fields(
 
 
 def _extreme_values(
-    fixed: Mapping[str, float],
+    fixed: Numbers,
     free: Mapping[str, tuple[float, float]],
     scenarios: Mapping[str, Scenario],
-    tolerances: Mapping[str, float],
+    tolerances: Numbers,
 ) -> dict[str, tuple[float, float]]:
     """Least and greatest value of every parameter over all cases."""
     ends = {n: (x, x) for n, x in fixed.items()} | dict(free)

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -11,7 +11,7 @@ import flint
 import numpy as np
 
 from tmsopt.models import Model, ParameterSet, Quantity, Values
-from tmsopt.records import Array
+from tmsopt.records import AnyNumbers, Array
 from tmsopt.roots import Root, Structure, exact_roots, structure
 
 STRUCTURE_TOLERANCE = 1e-11
@@ -40,7 +40,7 @@ def _may_have_huge_roots(a: Array) -> Any:
     return ends
 
 
-def _structure(values: Mapping[str, Any]) -> Structure:
+def _structure(values: AnyNumbers) -> Structure:
     assert isinstance(values, Values)
     a = [float(c) for c in values.coefficients]
     if not all(map(math.isfinite, a)) or _may_have_huge_roots(np.array(a)):
@@ -67,7 +67,7 @@ def _cached_structure(a: tuple[float, ...], off: tuple[float, ...]) -> Structure
     return structure(a, STRUCTURE_TOLERANCE, off)
 
 
-def roots_at(model: Model, of: ParameterSet, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
+def roots_at(model: Model, of: ParameterSet, parameters: AnyNumbers) -> tuple[Root, ...]:
     """Exact roots of the parameters as stored, rightmost first; none if a coefficient is undefined.
 
     Coefficients have 120 digits, and roots are isolated in ball arithmetic.
@@ -83,7 +83,7 @@ def roots_at(model: Model, of: ParameterSet, parameters: Mapping[str, Any]) -> t
     return exact_roots(coefficients[leading:])
 
 
-def _damping_ratio(values: Mapping[str, Any]) -> float:
+def _damping_ratio(values: AnyNumbers) -> float:
     if isinstance(values, Values) and values.model.carrier is not None:
         return math.nan  # a complex system has no fixed zero of frequency
     roots = values["structure"].roots
@@ -91,7 +91,7 @@ def _damping_ratio(values: Mapping[str, Any]) -> float:
     return min(ratios, default=math.nan)
 
 
-def _angular_frequency(values: Mapping[str, Any]) -> float:
+def _angular_frequency(values: AnyNumbers) -> float:
     return max((abs(r.im) for r in values["structure"].roots), default=math.nan)
 
 
@@ -140,7 +140,7 @@ def regularise(coefficients: Array) -> Array:
 
 
 def lifted_quantities(
-    model: Model, of: ParameterSet, parameters: Mapping[str, Any], expressions: Iterable[Callable[[Values], Any]]
+    model: Model, of: ParameterSet, parameters: AnyNumbers, expressions: Iterable[Callable[[Values], Any]]
 ) -> tuple[Quantity, ...]:
     """The quantities in expressions that are defined by an equation; proofs treat these as unknowns."""
     found: dict[str, Quantity] = {}

@@ -14,6 +14,7 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.problem.units import Dimension, dimension, unit_factor
 from tmsopt.problem.validate import SMALLEST
+from tmsopt.records import AnyNumbers, Numbers
 
 _PER_SECOND = "1/s"
 _FREQUENCY, _HERTZ = "frequency", "Hz"  # shown in Hz, not in 1/s
@@ -70,7 +71,7 @@ def unit_of(problem: Posed, text: str) -> Unit:
     return _usual_unit(problem, dimension_of(problem, text, units))
 
 
-def rate_of(problem: Posed, text: str, parameters: Mapping[str, Any]) -> Any:
+def rate_of(problem: Posed, text: str, parameters: AnyNumbers) -> Any:
     """The factor from √(g/w) to 1/s for an expression with that unit; None for other units or without seconds.
 
     Args:
@@ -82,13 +83,13 @@ def rate_of(problem: Posed, text: str, parameters: Mapping[str, Any]) -> Any:
     return of.rate(parameters)
 
 
-def unit_at(problem: Posed, text: str, parameters: Mapping[str, float]) -> Unit:
+def unit_at(problem: Posed, text: str, parameters: Numbers) -> Unit:
     """The unit to show an expression in at a design: rates in 1/s if the parameters define seconds."""
     rate = rate_of(problem, text, parameters)
     return unit_of(problem, text) if rate is None else Unit(_PER_SECOND, 1 / float(rate))
 
 
-def common_unit(problem: Posed, text: str, common: Mapping[str, float] | None = None) -> Unit:
+def common_unit(problem: Posed, text: str, common: Numbers | None = None) -> Unit:
     """The unit of `unit_at` if it is the same at all designs, for bounds and differences; else that of `unit_of`.
 
     Args:
@@ -102,7 +103,7 @@ def common_unit(problem: Posed, text: str, common: Mapping[str, float] | None = 
         return unit_of(problem, text)
 
 
-def show_at(problem: Posed, text: str, parameters: Mapping[str, float], value: float, digits: int = 5) -> str:
+def show_at(problem: Posed, text: str, parameters: Numbers, value: float, digits: int = 5) -> str:
     """A number in the unit of `unit_at`, followed by its own unit in parentheses if that differs."""
     shown, own = unit_at(problem, text, parameters), unit_of(problem, text)
     behind = f" ({own.show(value, digits)})" if shown != own and math.isfinite(value) else ""
@@ -119,7 +120,7 @@ def si_units(problem: Posed) -> dict[str, str]:
     return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
 
 
-def amounts_text(problem: Posed, amounts: Mapping[str, float]) -> str:
+def amounts_text(problem: Posed, amounts: Numbers) -> str:
     """The violation of each limit, in the units of the problem."""
     return ", ".join(f"{name} by {unit_of(problem, name).show(amount, 3)}" for name, amount in amounts.items())
 

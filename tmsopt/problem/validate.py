@@ -12,6 +12,7 @@ from tmsopt.models.user_spectrum import pattern_of, patterns_of, public_names
 from tmsopt.problem.advice.names import example_of, suggest_name
 from tmsopt.problem.cases import Band, points_of
 from tmsopt.problem.quantities import expand_names, root_names
+from tmsopt.records import AnyNumbers
 
 VARIATIONS = ("scenarios", "tolerances", "weights")
 """Tables of a problem that name parameters, in addition to `fixed` and `free`."""
@@ -31,7 +32,7 @@ Stated = Any
 """A problem as stated; any field may have any type."""
 
 
-def guess_parameter_set(model: Model, names: Mapping[str, Any]) -> ParameterSet:
+def guess_parameter_set(model: Model, names: AnyNumbers) -> ParameterSet:
     """The parameter set with most of the names; the native one in case of a tie."""
     return max(model.sets, key=lambda s: len(names.keys() & set(s.names)))
 

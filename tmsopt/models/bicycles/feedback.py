@@ -4,12 +4,13 @@ M q″ + D q′ + K q = −G (φ, δ, φ′, δ′), q = (lean, steer), so the g
 lag T′ + T = −G (…), and the row of each torque is multiplied by lag s + 1.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from tmsopt.algebra.kinds import absolute, pi, quotient, sqrt
 from tmsopt.models.model import Feedback, Matrix, Model, NumberFunction, Parameter, ParameterSet, Quantity, Range
+from tmsopt.records import AnyNumbers
 from tmsopt.roots.polynomial import determinant
 
 LAG = "lag"
@@ -77,8 +78,8 @@ class ControllableBicycle:
     """
 
     model: Model
-    matrices: Callable[[Mapping[str, Any]], tuple[Matrix, Matrix, Matrix]]
-    unit: Callable[[Mapping[str, Any], Any], tuple[Any, Any]]
+    matrices: Callable[[AnyNumbers], tuple[Matrix, Matrix, Matrix]]
+    unit: Callable[[AnyNumbers, Any], tuple[Any, Any]]
     speed: str
 
 
@@ -87,7 +88,7 @@ def native_name(name: str) -> str:
     return "tau" if name == LAG else f"kappa_{name.removeprefix('k_')}"
 
 
-def si_scale(name: str, p: Mapping[str, Any], rate: NumberFunction, torque: NumberFunction) -> Any:
+def si_scale(name: str, p: AnyNumbers, rate: NumberFunction, torque: NumberFunction) -> Any:
     """SI value of a parameter of [feedback] whose dimensionless value is 1."""
     if name == LAG:
         return 1 / rate(p)
@@ -112,7 +113,7 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
     def native(name: str) -> str:
         return name if in_si else native_name(name)
 
-    def gains(p: Mapping[str, Any]) -> dict[tuple[int, str], Any]:
+    def gains(p: AnyNumbers) -> dict[tuple[int, str], Any]:
         """Row and state → gain, from native parameters."""
         found: dict[tuple[int, str], Any] = {}
         for n, gain in listed.items():
@@ -120,7 +121,7 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
             found[key] = found[key] + term if key in found else term
         return found
 
-    def algebraic(p: Mapping[str, Any]) -> dict[str, Any]:
+    def algebraic(p: AnyNumbers) -> dict[str, Any]:
         plain = base.algebraic(p)
         own = {f"G_{row}_{x}": gain for (row, x), gain in gains(p).items()}
         return {**plain, **own, "h": sqrt(1 + plain["T"] * plain["T"])} | ({LAG: p[native(LAG)]} if has_lag else {})
@@ -137,13 +138,13 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
             rows[i][j][power] = rows[i][j][power] + values[f"G_{i}_{x}"] * unit[i][j]
         return determinant(rows)
 
-    def feedback(p: Mapping[str, Any]) -> Feedback:
+    def feedback(p: AnyNumbers) -> Feedback:
         by_place = gains(p)
         assert base.pencil is not None
         G = [[by_place.get((row, x), 0) for x in _STATES] for row in (0, 1)]
         return Feedback(base.pencil(p)[0], G, p[native(LAG)] if has_lag else None, driven)
 
-    def pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
+    def pencil(p: AnyNumbers) -> tuple[Matrix, ...]:
         assert base.pencil is not None
         M, D, K = base.pencil(p)
         G = feedback(p).gains
@@ -210,7 +211,7 @@ def _extend_set(
     to_native, rate, torque = base.native, base.rate, base.torque
     assert torque is not None
 
-    def to_native_with_gains(p: Mapping[str, Any]) -> dict[str, Any]:
+    def to_native_with_gains(p: AnyNumbers) -> dict[str, Any]:
         own = {native(n): p[n] if native(n) == n else p[n] / si_scale(n, p, rate, torque) for n in names}
         return {**to_native(p), **own}
 
@@ -218,7 +219,7 @@ def _extend_set(
     quantities = tuple(q for q in base.quantities if q.name not in _PASSIVE)
     every = (*base.parameters, *own)
 
-    def torques(v: Mapping[str, Any]) -> Feedback:
+    def torques(v: AnyNumbers) -> Feedback:
         return feedback(to_native_with_gains({p.name: v[p.name] for p in every}))
 
     quantities += tuple(_quantities(names, torques, rate))
@@ -247,11 +248,11 @@ def _parameter(name: str, unit: str, public_name: str) -> Parameter:
 def _quantities(names: tuple[str, ...], torques: Callable[..., Feedback], rate: NumberFunction) -> Iterator[Quantity]:
     """Torques that the controller must provide, in SI."""
 
-    def per_degree(v: Mapping[str, Any]) -> Any:
+    def per_degree(v: AnyNumbers) -> Any:
         gain = v["k_phi"] + (v["k_phi_v"] * v["v"] if "k_phi_v" in names else 0)
         return gain * pi(gain) / 180
 
-    def torque_after_push(v: Mapping[str, Any]) -> Any:
+    def torque_after_push(v: AnyNumbers) -> Any:
         """Torque per impulse: the rates jump by M⁻¹ (0, 1)."""
         found = torques(v)
         (a, b), (c, d) = found.mass

@@ -4,7 +4,6 @@ Parameters left out are 0: without wheels, trail and moments of inertia this is 
 the same parameters and roots.
 """
 
-from collections.abc import Mapping
 from pkgutil import resolve_name
 from typing import Any
 
@@ -16,6 +15,7 @@ from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, tangent_m
 from tmsopt.models.bicycles.whipple_quantities import COMPUTED, IN_MATRICES, algebraic, canonical
 from tmsopt.models.model import Matrix, Model, ParameterSet
 from tmsopt.models.tables import read_table
+from tmsopt.records import AnyNumbers
 
 _TABLES = read_table("bicycles/whipple")
 _NO_RADIUS = "a wheel without radius would turn infinitely fast"
@@ -32,7 +32,7 @@ _SI = ParameterSet(
 )
 
 
-def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
+def _pencil(p: AnyNumbers) -> tuple[Matrix, ...]:
     """M, v C1 and g K0 + v² K2."""
     return _matrices_at_speed(*canonical(p), p["v"], p["g"])
 
@@ -59,7 +59,7 @@ whipple = Model(
 """The Carvallo–Whipple bicycle; its roots are in 1/s."""
 
 
-def _scaled_matrices(p: Mapping[str, Any]) -> tuple[Matrix, Matrix, Matrix]:
+def _scaled_matrices(p: AnyNumbers) -> tuple[Matrix, Matrix, Matrix]:
     """M, v C1 and g K0 + v² K2 for a steer angle in units of w/cos λ_s."""
     return _matrices_at_speed(*tangent_matrices(**{name: p[name] for name in ("T", *IN_MATRICES)}), p["v"], p["g"])
 

@@ -13,6 +13,7 @@ from tmsopt.models.model import Matrix
 from tmsopt.models.names import name_fault
 from tmsopt.models.stated.degree import DEGREES, Degree, DegreeTooHigh
 from tmsopt.models.stated.pairs import IMAGINARY_UNIT, PAIRS, Pair, entry_pair, pair, replace_literals, restore_literals
+from tmsopt.records import AnyNumbers
 
 MOST_QUANTITIES = 500
 """More would take seconds to parse."""
@@ -62,9 +63,9 @@ class Texts:
     def __init__(
         self,
         fault: Callable[..., None],
-        known: Mapping[str, Any] | None = None,
+        known: AnyNumbers | None = None,
         kind: Kind = NODES,
-        constants: Mapping[str, Any] = MappingProxyType({}),
+        constants: AnyNumbers = MappingProxyType({}),
     ) -> None:
         self.fault = fault
         self.kind, self.constants = kind, constants

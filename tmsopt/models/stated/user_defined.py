@@ -34,6 +34,7 @@ from tmsopt.models.stated.equations import IMAGINARY, pencil, polynomial, sort_p
 from tmsopt.models.stated.pairs import complex_text
 from tmsopt.models.stated.real_form import complex_model, frequency_bounds
 from tmsopt.models.stated.texts import Unfit, parse_entries, place
+from tmsopt.records import AnyNumbers
 
 _ACCEPTED = "accepted: finite numbers, expressions in quotes, and SX expressions"
 _FINITE = "accepted: finite numbers, and expressions of them"
@@ -55,7 +56,7 @@ def from_matrices(
     C: Any = None,
     G: Any = None,
     name: str = "stated",
-    quantities: Mapping[str, Any] | None = None,
+    quantities: AnyNumbers | None = None,
 ) -> Model:
     """A model of M q″ + D q′ + K q = B u, or of x′ = A x + B u, from numbers, texts and CasADi expressions.
 
@@ -96,7 +97,7 @@ def from_matrices(
     return build_model("matrices", name, matrices, quantities)
 
 
-def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: Mapping[str, Any] | None = None) -> Model:
+def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: AnyNumbers | None = None) -> Model:
     """A model of a characteristic polynomial with descending coefficients, each like an entry of `from_matrices`.
 
     Raises:
@@ -117,7 +118,7 @@ def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: Ma
     return build_model("coefficients", name, {"coefficients": [row]}, quantities)
 
 
-def from_hamiltonian(H: Any, *, name: str = "stated", quantities: Mapping[str, Any] | None = None) -> Model:
+def from_hamiltonian(H: Any, *, name: str = "stated", quantities: AnyNumbers | None = None) -> Model:
     """A model of ψ′ = −i H ψ with a complex matrix H and eigenfrequencies ω = i s.
 
     Results refer to H: ``EP2`` is an exceptional point of H, the ``abscissa`` is the greatest Im ω (gain minus loss),
@@ -280,16 +281,16 @@ def _rebuilt(
     )
 
 
-def _function(x: Any, names: Sequence[str]) -> Callable[[Mapping[str, Any]], Any]:
+def _function(x: Any, names: Sequence[str]) -> Callable[[AnyNumbers], Any]:
     own = formula([x], names)
     return lambda given: values(own, given)[0]
 
 
-def _matrices(rows: Sequence[Matrix], names: Sequence[str]) -> Callable[[Mapping[str, Any]], tuple[Matrix, ...]]:
+def _matrices(rows: Sequence[Matrix], names: Sequence[str]) -> Callable[[AnyNumbers], tuple[Matrix, ...]]:
     """A function from named numbers to matrices, for matrices of nodes."""
     n, own = len(rows[0]), formula((x for P in rows for row in P for x in row), names)
 
-    def evaluate(given: Mapping[str, Any]) -> tuple[Matrix, ...]:
+    def evaluate(given: AnyNumbers) -> tuple[Matrix, ...]:
         found = iter(values(own, given))
         return tuple([[next(found) for _ in range(n)] for _ in range(n)] for _ in rows)
 

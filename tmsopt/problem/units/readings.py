@@ -1,11 +1,12 @@
 """Readings: numbers in mm, km/h and degrees, and the decay times and frequencies of roots."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from types import MappingProxyType
 from typing import Any
 
 from tmsopt.models import ParameterSet
+from tmsopt.records import AnyNumbers
 
 Reading = float | tuple[float, ...]
 """A number, or one per root; nan if undefined."""
@@ -60,8 +61,8 @@ def frequencies(roots: Iterable[Any], rate: Any, pi: Any = math.pi) -> tuple[Any
 
 def readings(
     of: ParameterSet,
-    parameters: Mapping[str, Any],
-    quantities: Mapping[str, Any],
+    parameters: AnyNumbers,
+    quantities: AnyNumbers,
     abscissa: Any,
     roots: Iterable[Any],
     pi: Any = math.pi,

@@ -10,6 +10,7 @@ from tmsopt.errors import Fault
 from tmsopt.models import ParameterSet, decimal
 from tmsopt.models.exact import Exact
 from tmsopt.problem.units.text import LONGEST, parse_exact_quantity
+from tmsopt.records import AnyNumbers
 
 TABLES = ("free", "fixed", "start", "scenarios", "tolerances", "weights")
 """Tables of a problem that hold numbers; the first unit typed for a parameter is kept."""
@@ -18,9 +19,7 @@ Typed = dict[str, dict[float, str]]
 """Parameter → double → the exact number that was typed, if the double's decimal differs."""
 
 
-def read_numbers(
-    tables: Mapping[str, Any], of: ParameterSet
-) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
+def read_numbers(tables: AnyNumbers, of: ParameterSet) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
     """Convert texts such as "25 cm" in the tables of a problem to numbers.
 
     Args:

@@ -1,6 +1,6 @@
 """Finds the eigenvectors of multiple roots, by ranks of the model's matrices."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import flint
@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.models.user_spectrum import user_roots
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.stability import MultipleRoot
-from tmsopt.records import Array, Complex
+from tmsopt.records import Array, Complex, Numbers
 from tmsopt.roots import Pattern, Root, jordan
 from tmsopt.roots.jordan import equilibrate
 from tmsopt.roots.patterns.structure import fit_unknowns
@@ -23,7 +23,7 @@ _NEAR = 1e-6  # relative distance within which two roots are the same
 _UNIT = 1e-3  # least unit for scaling the matrices at a root, as a share of the largest root
 
 
-def meetings(problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
+def meetings(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
     """The multiple roots among the roots of a design's polynomial, rightmost first, as users read them."""
     found: list[MultipleRoot] = []
     of_H = problem.model.carrier is not None
@@ -35,19 +35,19 @@ def meetings(problem: Posed, parameters: Mapping[str, float], roots: Sequence[Ro
     return tuple(sorted(found, key=lambda m: (-m.re, -m.im)))
 
 
-def is_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> bool:
+def is_crossing(problem: Posed, pattern: Pattern, parameters: Numbers) -> bool:
     """Whether a located multiple root has several eigenvectors, so that it is no exceptional point."""
     return any(not m.exceptional for m in located_meetings(problem, pattern, parameters))
 
 
-def located_meetings(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> tuple[MultipleRoot, ...]:
+def located_meetings(problem: Posed, pattern: Pattern, parameters: Numbers) -> tuple[MultipleRoot, ...]:
     """The multiple roots of a pattern with ``EP`` in its name; none without matrices."""
     if problem.model.pencil is None or "EP" not in pattern.name:
         return ()
     return meetings(problem, parameters, _located_roots(problem, pattern, parameters))
 
 
-def _located_roots(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> list[Root]:
+def _located_roots(problem: Posed, pattern: Pattern, parameters: Numbers) -> list[Root]:
     """The multiple roots of the nearest polynomial of a pattern."""
     values = problem.values(parameters)
     try:
@@ -64,7 +64,7 @@ def _located_roots(problem: Posed, pattern: Pattern, parameters: Mapping[str, fl
 
 
 def every_meeting(
-    problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root], violated: Collection[str]
+    problem: Posed, parameters: Numbers, roots: Sequence[Root], violated: Collection[str]
 ) -> tuple[MultipleRoot, ...]:
     """The multiple roots of a solution: first those of its pattern, unless it is violated, then the others."""
     shown, pattern = meetings(problem, parameters, roots), problem.pattern
@@ -84,7 +84,7 @@ def _number(root: Root | MultipleRoot) -> complex:
     return complex(root.re, root.im)
 
 
-def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> dict[str, float]:
+def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Numbers) -> dict[str, float]:
     """The parameters near a design where its located roots cross, more accurate than from coefficients."""
     roots = _located_roots(problem, pattern, parameters)
     root = max(roots, key=lambda r: r.multiplicity)
@@ -93,7 +93,7 @@ def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, 
 
 
 def _find_eigenvectors(
-    problem: Posed, parameters: Mapping[str, float], root: Root, user_root: Root, roots: Sequence[Root]
+    problem: Posed, parameters: Numbers, root: Root, user_root: Root, roots: Sequence[Root]
 ) -> MultipleRoot:
     k, pencil = root.multiplicity, problem.model.pencil
     if pencil is None:
@@ -112,9 +112,7 @@ def _unit(root: Root, roots: Sequence[Root]) -> float:
     return max(abs(_number(root)), _UNIT * max(abs(_number(r)) for r in roots)) or 1.0
 
 
-def _find_crossing(
-    problem: Posed, parameters: Mapping[str, float], s: complex, k: int, unit: float
-) -> tuple[Mapping[str, float], complex]:
+def _find_crossing(problem: Posed, parameters: Numbers, s: complex, k: int, unit: float) -> tuple[Numbers, complex]:
     """The crossing near a design and its root; the design itself if there is none nearby.
 
     Coefficients determine a crossing to half of their digits only, so the design may be 1e-5 away from it. At the
@@ -148,7 +146,7 @@ def _find_crossing(
     return parameters, s
 
 
-def _matrices(problem: Posed, parameters: Mapping[str, float]) -> list[Array]:
+def _matrices(problem: Posed, parameters: Numbers) -> list[Array]:
     assert problem.model.pencil is not None
     found = problem.model.pencil(problem.parameter_set.native(dict(parameters)))
     return [np.array(P, dtype=float) for P in found]
