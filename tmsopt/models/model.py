@@ -67,18 +67,13 @@ class Range:
     closed: bool = True
 
     def __contains__(self, value: float) -> bool:
-        if self.closed:
-            return self.lower <= value <= self.upper
-        return self.lower < value < self.upper
+        is_end = value in (self.lower, self.upper)
+        return self.lower <= value <= self.upper and (self.closed or not is_end)
 
     def __str__(self) -> str:
-        at_most, at_least = ("<=", ">=") if self.closed else ("<", ">")
-        ends = []
-        if np.isfinite(self.lower):
-            ends.append(f"{at_least} {self.lower:.6g}")
-        if np.isfinite(self.upper):
-            ends.append(f"{at_most} {self.upper:.6g}")
-        return " and ".join(ends) or "any finite number"
+        ends = zip("><", (self.lower, self.upper), strict=True)
+        texts = [f"{sign}{'=' * self.closed} {end:.6g}" for sign, end in ends if np.isfinite(end)]
+        return " and ".join(texts) or "any finite number"
 
 
 @dataclass(frozen=True)
@@ -175,17 +170,14 @@ class Quantity:
         return formula(piece(_SYMBOLS) for piece in self.pieces)
 
 
-class _Symbols(Mapping[str, Any]):
+class _Symbols(dict[str, Any]):
     """Maps every name to its symbol."""
 
-    def __getitem__(self, name: str) -> Any:
+    def __missing__(self, name: str) -> Any:
         return symbol(name)
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(())
-
-    def __len__(self) -> int:
-        return 0
+    def __contains__(self, name: object) -> bool:
+        return True
 
 
 _SYMBOLS = _Symbols()
@@ -340,10 +332,11 @@ class Model:
 
     @cached_property
     def _coefficient_names(self) -> tuple[str, ...]:
-        taken = {n for of in self.sets for n in (*of.names, *(q.name for q in of.quantities))}
-        taken |= {q.name for q in self.quantities}
-        plain = tuple(f"a{k}" for k in range(self.degree + 1))
-        return plain if taken.isdisjoint(plain) else tuple(f"coefficient{k}" for k in range(self.degree + 1))
+        taken = {q.name for of in self.sets for q in (*self.quantities, *of.quantities)} | {
+            n for of in self.sets for n in of.names
+        }
+        plain, long = ([f"{word}{k}" for k in range(self.degree + 1)] for word in ("a", "coefficient"))
+        return tuple(plain if taken.isdisjoint(plain) else long)
 
     def quantity_names(self, of: ParameterSet) -> tuple[str, ...]:
         """Names that an expression may use besides the parameters of a set and the quantities of the roots."""
