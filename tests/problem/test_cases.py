@@ -102,7 +102,7 @@ z_H = "5 mm"
 
 FAULTS = [
     # section, what is written, its key, what the message must name
-    ("scenarios", "Fr = { min = 2.4, max = 1.2 }", "Fr", ["min = 2.4", "less than max = 1.2"]),
+    ("scenarios", "Fr = { min = 2.4, max = 1.2 }", "Fr", ["min = 2.4", "max = 1.2"]),
     ("scenarios", "Fr = { min = 1.2, max = 2.4, points = 1 }", "Fr.points", ["points = 1", "2 to 99"]),
     ("scenarios", "Fr = { min = 1.2, max = 2.4, steps = 3 }", "Fr.steps", ["'steps'", "min max points"]),
     ("scenarios", "Fr = { min = 1.2 }", "Fr.max", ["missing max", "points = 7"]),

@@ -6,9 +6,9 @@ from typing import Any
 
 from tmsopt.errors import InputError
 from tmsopt.models import Model, controlled
-from tmsopt.problem.cases import Scenario, middle_of, parse_scenario, points_of
+from tmsopt.problem.cases import middle_of, parse_scenario, points_of
 from tmsopt.problem.units import TABLES, read_numbers
-from tmsopt.problem.validate import find_faults, guess_parameter_set, shape_faults
+from tmsopt.problem.validate import find_faults, shape_faults
 from tmsopt.records import Numbers
 
 _POINT = 1e-12
@@ -27,11 +27,12 @@ def normalise(**stated: Any) -> dict[str, Any]:
     problem.scenarios = {n: parse_scenario(s) for n, s in problem.scenarios.items()}
     names = {**problem.fixed, **problem.free, **problem.scenarios}
     problem.model = controlled(problem.model, names)
-    of = guess_parameter_set(problem.model, names)
+    # The parameter set with most of the names; the native one in case of a tie.
+    of = max(problem.model.sets, key=lambda s: len(names.keys() & set(s.names)))
     read, units, typed, unreadable = read_numbers({table: getattr(problem, table) for table in TABLES}, of)
     vars(problem).update(read)
     places = {f.key[:2] for f in unreadable}
-    if found := [*unreadable, *(f for f in find_faults(problem) if f.key[:2] not in places)]:
+    if found := [*unreadable, *(f for f in find_faults(problem, of) if f.key[:2] not in places)]:
         raise InputError(found)
     problem.units = {**units, **problem.units}
     problem.written = {n: {**typed.get(n, {}), **problem.written.get(n, {})} for n in (*problem.written, *typed)}
@@ -60,23 +61,13 @@ def complete_fields(
     carrier for the ranges.
     """
     pinned = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
-    ends = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in pinned}
     values = {n: float(v) for n, v in {**fixed, **pinned}.items()}
+    ends = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in pinned}
     first = {n: float(v) for n, v in start.items() if n in ends}
-    within = model.within(_extreme_values(values, ends, others["scenarios"], others["tolerances"]))
+    reach = {n: (x, x) for n, x in values.items()} | ends  # least and greatest value over all cases
+    for name, scenario in others["scenarios"].items():
+        points = [*points_of(scenario), values[name]]
+        reach[name] = min(points), max(points)
+    rooms = {n: others["tolerances"].get(n, 0.0) for n in reach}
+    within = model.within({n: (lo - rooms[n], hi + rooms[n]) for n, (lo, hi) in reach.items()})
     return {"model": within, "fixed": values, "free": ends, "start": first, **others}
-
-
-def _extreme_values(
-    fixed: Numbers,
-    free: Mapping[str, tuple[float, float]],
-    scenarios: Mapping[str, Scenario],
-    tolerances: Numbers,
-) -> dict[str, tuple[float, float]]:
-    """Least and greatest value of every parameter over all cases."""
-    ends = {n: (x, x) for n, x in fixed.items()} | dict(free)
-    for name, scenario in scenarios.items():
-        points = [*points_of(scenario), fixed[name]]
-        ends[name] = min(points), max(points)
-    rooms = {n: tolerances.get(n, 0.0) for n in ends}
-    return {n: (lo - rooms[n], hi + rooms[n]) for n, (lo, hi) in ends.items()}
