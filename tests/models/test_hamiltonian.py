@@ -168,13 +168,13 @@ def test_what_is_refused_is_told(H, words):
 
 @pytest.mark.parametrize(
     ("table", "words"),
-    [
-        ('H = [["w"]]\nA = [["w"]]', "together with A; keep H, a complex system"),
-        ('H = [["1j*w", 1]]', "found rows of 2 entries"),
-        ('H = [["w - 2j*"]]', "'w - 2j*' does not parse"),
-        ('H = "w"', "accepted: rows in brackets"),
-        ('A = [["1j*w"]]', "only the matrix H may be complex"),
-    ],
+    {
+        'H = [["w"]]\nA = [["w"]]': "together with A; keep H, a complex system",
+        'H = [["1j*w", 1]]': "found rows of 2 entries",
+        'H = [["w - 2j*"]]': "'w - 2j*' does not parse",
+        'H = "w"': "accepted: rows in brackets",
+        'A = [["1j*w"]]': "only the matrix H may be complex",
+    }.items(),
 )
 def test_a_file_is_refused_at_its_line(tmp_path, table, words):
     path = tmp_path / "own.toml"

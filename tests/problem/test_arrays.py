@@ -122,14 +122,14 @@ def test_constraints_are_those_of_one_design_at_a_time():
 
 @pytest.mark.parametrize(
     ("text", "exists"),
-    [
-        ("sqrt(lambda_s)", lambda s: s >= 0),
-        ("sqrt(lambda_s)**2", lambda s: s >= 0),  # lambda_s, if it were simplified
-        ("0 * log(lambda_s)", lambda s: s > 0),
-        ("log(lambda_s) - log(lambda_s)", lambda s: s > 0),
-        ("min(Fr, sqrt(lambda_s))", lambda s: s >= 0),  # Fr, in CasADi
-        ("max(asin(2 * lambda_s), 5)", lambda s: abs(s) <= 0.5),
-    ],
+    {
+        "sqrt(lambda_s)": lambda s: s >= 0,
+        "sqrt(lambda_s)**2": lambda s: s >= 0,  # lambda_s, if it were simplified
+        "0 * log(lambda_s)": lambda s: s > 0,
+        "log(lambda_s) - log(lambda_s)": lambda s: s > 0,
+        "min(Fr, sqrt(lambda_s))": lambda s: s >= 0,  # Fr, in CasADi
+        "max(asin(2 * lambda_s), 5)": lambda s: abs(s) <= 0.5,
+    }.items(),
 )
 def test_nan_where_a_value_does_not_exist(text, exists):
     tilts = np.array([-1.1, -0.5, -0.25, 0.25, 0.5, 1.2])[:, None]

@@ -107,7 +107,7 @@ def test_growth_is_hedged_unless_fractions_show_it(model, at, growth, exact):
     assert all(("as far as rounding tells" in line) is not exact for line in moved)
 
 
-@pytest.mark.parametrize(("k", "exact"), [("1/4", True), ("1/4 + 1e-13", False), ("sqrt(2)/4*sqrt(2)/2", False)])
+@pytest.mark.parametrize(("k", "exact"), {"1/4": True, "1/4 + 1e-13": False, "sqrt(2)/4*sqrt(2)/2": False}.items())
 def test_roots_meet_as_far_as_rounding_tells(k, exact):
     """s² + s + k is a square at k = 1/4."""
     found = tmsopt.solve(tmsopt.Problem(from_coefficients([1, 1, "k"]), fixed={"k": k}))

@@ -309,8 +309,8 @@ class Model:
         found = {}
         for of in self.sets:
             native = of.native({n: symbol(n) for n in of.names})
-            listed = [native[n] for n in self.sets[0].names]
-            found[of.name] = formula([*listed, *self.polynomial(**self.algebraic(native))], of.names)
+            coefficients = self.polynomial(**self.algebraic(native))
+            found[of.name] = formula([*(native[n] for n in self.sets[0].names), *coefficients], of.names)
         return found
 
     def within(self, ranges: Mapping[str, tuple[float, float]]) -> "Model":
@@ -434,8 +434,7 @@ class Values(Mapping[str, Any]):
         sizes |= {n: width for n, width in ranges.items() if sizes[n] <= _NEGLIGIBLE * width}
         with flint.ctx.workprec(_BITS):
             balls = {n: flint.arb(float(x), sizes[n] * _EPSILON) for n, x in parameters.items()}
-            found = model.coefficients(balls, of)
-        return [float(c.rad()) if c.is_finite() else np.inf for c in found]
+            return [float(c.rad()) if c.is_finite() else np.inf for c in model.coefficients(balls, of)]
 
     def with_known(self, known: AnyNumbers) -> "Values":
         """Values of the same design, with given numbers in place of some formulas."""

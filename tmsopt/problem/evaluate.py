@@ -115,7 +115,7 @@ def parse_all(problem: Posed, expressions: Mapping[str, str | Expression]) -> di
         InputError: listing every text that is no expression of this problem.
     """
     found: dict[str, Expression] = {}
-    faults: list[Fault] = []
+    faults = []
     for name, given in expressions.items():
         try:
             found[name] = given if isinstance(given, Expression) else problem.read(given)

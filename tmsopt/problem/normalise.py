@@ -1,15 +1,13 @@
 """Turns a problem as stated into one that can be solved: numbers in rad and SI, complete tables, all faults at once."""
 
-from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
 from tmsopt.errors import InputError
-from tmsopt.models import Model, controlled
+from tmsopt.models import controlled
 from tmsopt.problem.cases import middle_of, parse_scenario, points_of
 from tmsopt.problem.units import TABLES, read_numbers
 from tmsopt.problem.validate import find_faults, shape_faults
-from tmsopt.records import Numbers
 
 _POINT = 1e-12
 """A range narrower than this, relative to its ends, is a single value."""
@@ -41,33 +39,27 @@ def normalise(**stated: Any) -> dict[str, Any]:
     problem.fixed = {n: v for n, v in {**defaults, **nominal, **problem.fixed}.items() if n not in problem.free}
     for table in ("tolerances", "weights"):
         setattr(problem, table, {n: float(v) for n, v in getattr(problem, table).items()})
-    for sense in ("minimize", "maximize"):
-        setattr(problem, sense, (text := getattr(problem, sense)) and text.strip())
+    problem.minimize, problem.maximize = (text and text.strip() for text in (problem.minimize, problem.maximize))
     problem.constraints = {n: text.strip() for n, text in problem.constraints.items()}
     problem.pareto = tuple(text.strip() for text in problem.pareto)  # reports show it on one line
     return complete_fields(**vars(problem))
 
 
-def complete_fields(
-    model: Model,
-    fixed: Numbers,
-    free: Mapping[str, tuple[float, float]],
-    start: Numbers,
-    **others: Any,
-) -> dict[str, Any]:
+def complete_fields(**given: Any) -> dict[str, Any]:
     """The fields of a problem from valid numbers and texts.
 
     A range of one value becomes a fixed parameter, starts are kept for free parameters only, and a complex H gets a
     carrier for the ranges.
     """
+    free = given["free"]
     pinned = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
-    values = {n: float(v) for n, v in {**fixed, **pinned}.items()}
-    ends = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in pinned}
-    first = {n: float(v) for n, v in start.items() if n in ends}
-    reach = {n: (x, x) for n, x in values.items()} | ends  # least and greatest value over all cases
-    for name, scenario in others["scenarios"].items():
-        points = [*points_of(scenario), values[name]]
+    fixed = {n: float(v) for n, v in {**given["fixed"], **pinned}.items()}
+    free = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in pinned}
+    start = {n: float(v) for n, v in given["start"].items() if n in free}
+    reach = {n: (x, x) for n, x in fixed.items()} | free  # least and greatest value over all cases
+    for name, scenario in given["scenarios"].items():
+        points = [*points_of(scenario), fixed[name]]
         reach[name] = min(points), max(points)
-    rooms = {n: others["tolerances"].get(n, 0.0) for n in reach}
-    within = model.within({n: (lo - rooms[n], hi + rooms[n]) for n, (lo, hi) in reach.items()})
-    return {"model": within, "fixed": values, "free": ends, "start": first, **others}
+    rooms = {n: given["tolerances"].get(n, 0.0) for n in reach}
+    within = given["model"].within({n: (lo - rooms[n], hi + rooms[n]) for n, (lo, hi) in reach.items()})
+    return given | {"model": within, "fixed": fixed, "free": free, "start": start}

@@ -201,8 +201,7 @@ class Posed(_Fields):
     @cached_property
     def objective(self) -> Expression | None:
         """The expression to optimise; None without one."""
-        text = self.minimize if self.minimize is not None else self.maximize
-        return None if text is None else self.read(text)
+        return next((self.read(text) for text in (self.minimize, self.maximize) if text is not None), None)
 
     @cached_property
     def objectives(self) -> tuple[Expression, ...]:
@@ -212,8 +211,7 @@ class Posed(_Fields):
     @cached_property
     def conditions(self) -> dict[str, Expression]:
         """The constraints, parsed."""
-        of = self.parameter_set
-        texts = {name: expand_names(text, of) for name, text in self.constraints.items()}
+        texts = {name: expand_names(text, self.parameter_set) for name, text in self.constraints.items()}
         return {name: parse_comparison(text, self.vocabulary) for name, text in texts.items()}
 
     def read(self, text: str) -> Expression:

@@ -43,11 +43,12 @@ def _may_have_huge_roots(a: Array) -> Any:
 def _structure(values: AnyNumbers) -> Structure:
     assert isinstance(values, Values)
     a = [float(c) for c in values.coefficients]
+    undecided = Structure("undecided", (), math.inf)
     if not all(map(math.isfinite, a)) or _may_have_huge_roots(np.array(a)):
-        return Structure("undecided", (), math.inf)  # a singular mass matrix: a root at infinity
+        return undecided  # a singular mass matrix: a root at infinity
     off = values.roundings()
     if abs(a[0]) <= off[0] < math.inf:
-        return Structure("undecided", (), math.inf)  # a0 may be 0 within rounding
+        return undecided  # a0 may be 0 within rounding
     found = _cached_structure(tuple(a), tuple(map(float, off)))
     simple = found.name in SIMPLE and all(root.multiplicity == 1 for root in found.roots)
     if simple and _scatter(np.array(a), found) > _SCATTER:

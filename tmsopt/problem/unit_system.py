@@ -62,13 +62,10 @@ def unit_of(problem: Posed, text: str) -> Unit:
     name = text.strip().removesuffix(".min").removesuffix(".max").removesuffix(".limit")
     if name in problem.parameter_set.names:
         return _make_unit(problem.units.get(name, ""), units[name])
-    if units.get(_FREQUENCY) == _HERTZ and set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name))) == {
-        _FREQUENCY
-    }:
+    used = set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name)))
+    if units.get(_FREQUENCY) == _HERTZ and used == {_FREQUENCY}:
         return Unit(_HERTZ)
-    if name in units:
-        return _usual_unit(problem, Dimension.of(units[name]))
-    return _usual_unit(problem, dimension_of(problem, text, units))
+    return _usual_unit(problem, Dimension.of(units[name]) if name in units else dimension_of(problem, text, units))
 
 
 def rate_of(problem: Posed, text: str, parameters: AnyNumbers) -> Any:
@@ -128,14 +125,14 @@ def amounts_text(problem: Posed, amounts: Numbers) -> str:
 def limit_text(problem: Posed, name: str) -> str:
     """A limit with its number in the unit of the problem; empty if there is no such limit."""
     unit = unit_of(problem, name)
-    if name not in problem.constraints:
-        parameter, _, end = name.rpartition(".")
-        if parameter not in problem.free or end not in ("min", "max"):
-            return ""
-        return f"{'>=' if end == 'min' else '<='} {unit.show(problem.free[parameter][end == 'max'], 6)}"
-    text = problem.constraints[name]
-    limit = split_limit(text)
-    return limit.replace_number(unit.show(limit.value, 9)) if limit and unit.text else text
+    text = problem.constraints.get(name)
+    if text is not None:
+        limit = split_limit(text)
+        return limit.replace_number(unit.show(limit.value, 9)) if limit and unit.text else text
+    parameter, _, end = name.rpartition(".")
+    if parameter not in problem.free or end not in ("min", "max"):
+        return ""
+    return f"{'>=' if end == 'min' else '<='} {unit.show(problem.free[parameter][end == 'max'], 6)}"
 
 
 def units_of(problem: Posed, texts: Iterable[str] = ()) -> dict[str, str]:
@@ -145,11 +142,9 @@ def units_of(problem: Posed, texts: Iterable[str] = ()) -> dict[str, str]:
         texts: further expressions, in addition to parameters, quantities and constraints.
     """
     units = si_units(problem)
-    asked = {
-        text: dimension_of(problem, text, units).unit
-        for text in (*problem.constraints, *(t for t in texts if t not in units))
-    }
-    return {name: unit for name, unit in {**units, **asked}.items() if unit != "1"}
+    texts = (*problem.constraints, *(t for t in texts if t not in units))
+    units |= {text: dimension_of(problem, text, units).unit for text in texts}
+    return {name: unit for name, unit in units.items() if unit != "1"}
 
 
 def dimension_of(problem: Posed, text: str, units: Mapping[str, str] | None = None) -> Dimension:

@@ -12,7 +12,7 @@ from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import name_fault
 from tmsopt.models.stated.degree import DEGREES, Degree, DegreeTooHigh
-from tmsopt.models.stated.pairs import IMAGINARY_UNIT, PAIRS, Pair, entry_pair, pair, replace_literals, restore_literals
+from tmsopt.models.stated.pairs import IMAGINARY_UNIT, PAIRS, entry_pair, pair, replace_literals, restore_literals
 from tmsopt.records import AnyNumbers
 
 MOST_QUANTITIES = 500
@@ -124,10 +124,6 @@ class Texts:
             values[name] = self.quantity(name) if derived else symbol(name)
         try:
             degree = expression.of({n: self._degrees.get(n, Degree()) for n in values}, DEGREES)
-        except DegreeTooHigh as error:
-            self.fault(f"{where}{error}", *key)
-            return 0, Degree()
-        try:
             return expression.of(values, kind), degree
         except DegreeTooHigh as error:
             self.fault(f"{where}'{expression.text}' {error}", *key)
@@ -164,19 +160,16 @@ def parse_entries(
     texts.read_quantities(in_text)
 
     def entry(x: Any, n: str, i: int, j: int) -> Any:
-        where = place(n, i, j)
+        where, earlier = place(n, i, j), set(texts.names)
+        if isinstance(x, str) and not of_H:
+            return texts.entry(x, n, where)
         if isinstance(x, str):
-            return parse_pair(x, where) if of_H else texts.entry(x, n, where)
-        if of_H and isinstance(x, tuple) and len(x) != 2:
+            x = pair(texts.entry(replace_literals(x), n, where))
+            for name in (name for name in _UNIT_NAMES if name in texts.names and name not in earlier):
+                fault(f"{where}: '{name}' would be a parameter; write the imaginary unit as 1j", n)
+        elif of_H and isinstance(x, tuple) and len(x) != 2:
             fault(f"{where}: found {short(x)}; accepted: a real and an imaginary part", n)
         return entry_pair(x) if of_H else x
-
-    def parse_pair(text: str, where: str) -> Pair:
-        earlier = set(texts.names)
-        found = pair(texts.entry(replace_literals(text), "H", where))
-        for name in (n for n in _UNIT_NAMES if n in texts.names and n not in earlier):
-            fault(f"{where}: '{name}' would be a parameter; write the imaginary unit as 1j", "H")
-        return found
 
     parsed = {
         n: [[entry(x, n, i, j) for j, x in enumerate(row, start=1)] for i, row in enumerate(rows, start=1)]

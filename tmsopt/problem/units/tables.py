@@ -35,16 +35,14 @@ def read_numbers(tables: AnyNumbers, of: ParameterSet) -> tuple[dict[str, Any], 
     def number(value: Any, table: str, name: str, *end: str) -> Any:
         if name not in of.names or not isinstance(value, str | Fraction | int) or isinstance(value, bool):
             return value
-        unit = of[name].unit
-        sizes = table in ("tolerances", "weights")
+        sizes, unit = table in ("tolerances", "weights"), of[name].unit
         if unit == "1" and sizes:
             unit = of[name].multiple_of or unit  # 5 mm is 0.005 of a wheelbase of 1 m
         try:
-            found, written, exact = (
-                parse_exact_quantity(value, unit)
-                if isinstance(value, str)
-                else (value, "", Exact.from_fraction(Fraction(value)))
-            )
+            if isinstance(value, str):
+                found, written, exact = parse_exact_quantity(value, unit)
+            else:
+                found, written, exact = float(value), "", Exact.from_fraction(Fraction(value))
             if not sizes and exact and exact.fraction != decimal(float(found)):
                 typed.setdefault(name, {})[float(found)] = str(exact)
         except OverflowError:  # an integer too large for a double
@@ -58,12 +56,13 @@ def read_numbers(tables: AnyNumbers, of: ParameterSet) -> tuple[dict[str, Any], 
 
     def read_table(table: str, key: str) -> Iterator[tuple[str, Any]]:
         for name, value in tables[table].items():
+            is_list = isinstance(value, Sequence) and not isinstance(value, str)
             if is_dataclass(value) and not isinstance(value, type):  # a band
                 ends = {end: number(getattr(value, end), key, name, end) for end in ("min", "max")}
                 yield name, replace(value, **ends)
-            elif table == "free" and isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2:
+            elif table == "free" and is_list and len(value) == 2:
                 yield name, tuple(number(x, key, name, end) for x, end in zip(value, ("min", "max"), strict=True))
-            elif table == "scenarios" and isinstance(value, Sequence) and not isinstance(value, str):
+            elif table == "scenarios" and is_list:
                 yield name, tuple(number(x, key, name) for x in value)
             else:
                 yield name, number(value, key, name, *(["start"] if table == "start" else []))

@@ -49,9 +49,8 @@ def located_meetings(problem: Posed, pattern: Pattern, parameters: Numbers) -> t
 
 def _located_roots(problem: Posed, pattern: Pattern, parameters: Numbers) -> list[Root]:
     """The multiple roots of the nearest polynomial of a pattern."""
-    values = problem.values(parameters)
     try:
-        (unknowns, *_) = fit_unknowns(pattern, np.array([float(c) for c in values.coefficients]))
+        (unknowns, *_) = fit_unknowns(pattern, np.array([float(c) for c in problem.values(parameters).coefficients]))
     except ValueError:
         return []
     return [
@@ -98,10 +97,9 @@ def _find_eigenvectors(
     k, pencil = root.multiplicity, problem.model.pencil
     if pencil is None:
         return MultipleRoot(user_root.re, user_root.im, k, None, k)
-    of = problem.parameter_set
     unit = _unit(root, roots)
     at, s = _find_crossing(problem, parameters, _number(root), k, unit)
-    matrices = pencil(of.native({n: flint.arb(x) for n, x in at.items()}))
+    matrices = pencil(problem.parameter_set.native({n: flint.arb(x) for n, x in at.items()}))
     found = jordan(matrices, flint.acb(s.real, s.imag), k, _RANK, unit)
     partial = found.partial or (k - found.geometric + 1,)
     return MultipleRoot(user_root.re, user_root.im, k, found.geometric, partial[0])
@@ -119,29 +117,28 @@ def _find_crossing(problem: Posed, parameters: Numbers, s: complex, k: int, unit
     crossing the block of L(s) of the least singular values vanishes, which is a regular equation in the parameters.
     """
     free = [n for n, (low, high) in problem.free.items() if high > low]
-    widths = np.array([problem.free[n][1] - problem.free[n][0] for n in free])
+    start = np.array([*(float(parameters[n]) for n in free), s.real, s.imag])
+    widths = np.array([*(problem.free[n][1] - problem.free[n][0] for n in free), unit, unit])
     size, scale = equilibrate(_matrices(problem, parameters), unit)
     scale = scale / np.linalg.norm(size * scale, 2)  # constant, so that it does not jump with the entries
 
     def design_at(x: Array) -> dict[str, float]:
-        return {**parameters, **dict(zip(free, x.tolist(), strict=True))}
+        return {**parameters, **dict(zip(free, x.tolist(), strict=False))}
 
-    def scaled_matrix(x: Array, z: complex) -> Complex:
-        matrices = _matrices(problem, design_at(x))
-        whole = sum(P * z ** (len(matrices) - 1 - j) for j, P in enumerate(matrices))
-        return np.asarray(scale * whole, dtype=complex)
+    def scaled_matrix(x: Array) -> Complex:
+        found = np.polyval(_matrices(problem, design_at(x)), complex(*x[-2:]))
+        return np.asarray(scale * found, dtype=complex)
 
     for count in range(k, 1, -1):
-        x, z = np.array([float(parameters[n]) for n in free]), s
+        x = start
         for _ in range(_STEPS):
-            left, values, right = np.linalg.svd(scaled_matrix(x, z))
+            left, values, right = np.linalg.svd(scaled_matrix(x))
             if count > len(values) or values[-count] > _CLOSE:
                 break
             if values[-count] <= _VANISHED:
-                return design_at(x), z
-            step = _newton_step(scaled_matrix, x, widths, z, unit, left[:, -count:], right[-count:])
-            x, z = x + widths * step[:-2], z + unit * complex(*step[-2:])
-            if (np.abs(x - [parameters[n] for n in free]) > _REACH * widths).any():
+                return design_at(x), complex(*x[-2:])
+            x = x + widths * _newton_step(scaled_matrix, x, widths, left[:, -count:], right[-count:])
+            if (np.abs(x - start) > _REACH * widths)[:-2].any():
                 break
     return parameters, s
 
@@ -153,22 +150,14 @@ def _matrices(problem: Posed, parameters: Numbers) -> list[Array]:
 
 
 def _newton_step(
-    scaled_matrix: Callable[[Array, complex], Complex],
-    x: Array,
-    widths: Array,
-    z: complex,
-    unit: float,
-    left: Complex,
-    right: Complex,
+    scaled_matrix: Callable[[Array], Complex], x: Array, widths: Array, left: Complex, right: Complex
 ) -> Array:
     """A Gauss–Newton step towards a vanishing block of L, in shares of the box and of the unit of the root."""
 
-    def block(at: Array, root: complex) -> Array:
-        B = (left.conj().T @ scaled_matrix(at, root) @ right.conj().T).ravel()
+    def block(at: Array) -> Array:
+        B = (left.conj().T @ scaled_matrix(at) @ right.conj().T).ravel()
         return np.concatenate([B.real, B.imag])
 
-    base = block(x, z)
-    moves = [*(widths * row for row in np.eye(len(x))), *np.zeros((2, len(x)))]
-    turns = [*([0.0] * len(x)), unit, 1j * unit]
-    columns = [(block(x + _STEP * m, z + _STEP * t) - base) / _STEP for m, t in zip(moves, turns, strict=True)]
+    base = block(x)
+    columns = [(block(x + _STEP * move) - base) / _STEP for move in np.diag(widths)]
     return np.asarray(np.linalg.lstsq(np.array(columns).T, -base, rcond=1e-9)[0])
