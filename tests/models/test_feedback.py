@@ -4,7 +4,6 @@ import math
 import pickle
 from fractions import Fraction
 
-import casadi as ca
 import flint
 import mpmath
 import numpy as np
@@ -209,24 +208,6 @@ def test_a_short_lag_is_none(lag):
 
 def roots(coefficients):
     return [complex(r.re, r.im) for r in exact_roots(coefficients) for _ in range(r.multiplicity)]
-
-
-@pytest.mark.parametrize("kind", GAINS)
-@pytest.mark.parametrize("model", [tms, whipple], ids=lambda m: m.name)
-def test_every_arithmetic_evaluates_the_same_formula(model, kind):
-    robot = controlled(model, GAINS[kind])
-    si = robot.parameter_set("SI")
-    rng = np.random.default_rng(6)
-    rows = [{n: b[n] if n in b else rng.uniform(0.1, 3) for n in si.names} for b in bicycles(6, seed=17)]
-    arrays = np.stack(robot.coefficients({n: np.array([p[n] for p in rows]) for n in si.names}, si), axis=-1)
-    x = ca.SX.sym("x", len(si.names))
-    made = robot.coefficients(dict(zip(si.names, ca.vertsplit(x), strict=True)), si)
-    function = ca.Function("a", [x], [ca.vertcat(*made)])
-    for p, row in zip(rows, arrays, strict=True):
-        exact = [float(b.mid()) for b in robot.coefficients({n: flint.arb(x) for n, x in p.items()}, si)]
-        for got in (row, robot.coefficients(p, si), np.array(function(list(p.values()))).ravel()):
-            # differences of products that are some 1e3 of the coefficients left
-            np.testing.assert_allclose(got, exact, rtol=1e-10, atol=1e-13 * max(map(abs, exact)))
 
 
 # Poles where one wants them

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.bicycles import BENCHMARK, appendix
+from helpers.bicycles import BENCHMARK, abscissa as abscissa_of
 from helpers.texts import faults, load
 
 import tmsopt
@@ -179,21 +179,10 @@ def test_faults_of_a_study_are_in_its_own_table(tmp_path):
 # The problems of the gallery
 
 
-def eigenvalues(v, k):
-    """Of the benchmark bicycle by the appendix, with the gains in the row of the steer torque."""
-    M, C1, K0, K2 = (
-        np.array(m, dtype=float) for m in appendix(BENCHMARK, math.sin(math.pi / 10), math.cos(math.pi / 10))
-    )
-    D, K = v * C1, 9.81 * K0 + v * v * K2
-    gains = {n: k.get(f"k_{n}", 0.0) + k.get(f"k_{n}_v", 0.0) * v for n in ("phi", "delta", "phidot", "deltadot")}
-    K[1] += [gains["phi"], gains["delta"]]
-    D[1] += [gains["phidot"], gains["deltadot"]]
-    inverse = np.linalg.inv(M)
-    return np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ D]]))
-
-
 def abscissa(v, k):
-    return float(eigenvalues(v, k).real.max())
+    """Of the benchmark bicycle by the appendix, with the gains in the row of the steer torque."""
+    gains = [k.get(f"k_{n}", 0.0) + k.get(f"k_{n}_v", 0.0) * v for n in ("phi", "phidot", "delta", "deltadot")]
+    return float(abscissa_of(BENCHMARK, v, gains))
 
 
 def test_the_schedule_is_stable_at_every_speed_and_its_torque_the_least():

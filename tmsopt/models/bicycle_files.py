@@ -162,13 +162,14 @@ def write_bicycle(bicycle: Bicycle | Numbers, path: str | PathLike[str]) -> None
     missing = [n for n in _SI.names if n not in values and n not in _OPTIONAL]
     if missing:
         raise InputError([Fault(f"missing parameter {', '.join(missing)}", ("parameters",))])
-    rows = {written: (values[n], own.uncertainties.get(n, 0.0)) for n, written in _FILE_NAMES.items() if n in values}
-    rows |= {n: (float(own.others.get(n, 0.0)), 0.0) for n in ("IByy", "IHyy")}
+    numbers = {w: values[n] for n, w in _FILE_NAMES.items() if n in values}
+    numbers |= {n: float(own.others.get(n, 0.0)) for n in ("IByy", "IHyy")}
+    deviations = {_FILE_NAMES[n]: f"+/-{_decimal(u)}" for n, u in own.uncertainties.items() if u}
     if ending in _TEXT:
-        lines = [f"{n} = {_decimal(v)}" + (f"+/-{_decimal(u)}" if u else "") for n, (v, u) in sorted(rows.items())]
+        lines = [f"{n} = {_decimal(x)}{deviations.get(n, '')}" for n, x in sorted(numbers.items())]
     else:
         head = ["parameterization: Meijaard2007", f"parameters: {_quote(own.name)}", "rider: null", "description: ''"]
-        lines = [*head, "values:", *(f"  {n}: {_decimal(v)}" for n, (v, _) in sorted(rows.items()))]
+        lines = [*head, "values:", *(f"  {n}: {_decimal(x)}" for n, x in sorted(numbers.items()))]
     write_text(file, "\n".join(lines) + "\n")
 
 

@@ -28,6 +28,9 @@ NumberFunction = Callable[[AnyNumbers], Any]
 Matrix = list[list[Any]]
 """Rows of numbers of any kind."""
 
+Matrices = tuple[Matrix, ...]
+"""Matrices of a matrix polynomial, in descending powers."""
+
 ROOTS = ("abscissa", "damping_ratio", "angular_frequency")
 """Quantities of the roots that formulas may use."""
 
@@ -266,7 +269,7 @@ class Model:
     polynomial: Callable[..., list[Any]]
     quantities: tuple[Quantity, ...] = ()
     compact: Callable[..., list[Any]] | None = None
-    pencil: Callable[[AnyNumbers], tuple[Matrix, ...]] | None = None
+    pencil: Callable[[AnyNumbers], Matrices] | None = None
     feedback: Callable[[AnyNumbers], Feedback] | None = None
     natural: bool = False
     origin: tuple[Callable[..., "Model"], tuple[Any, ...]] | None = None
@@ -279,7 +282,7 @@ class Model:
     absent: Mapping[str, str] = Table()
     carrier: float | None = None
     carried: Callable[[Mapping[str, tuple[float, float]]], "Model"] | None = None
-    double: Callable[[AnyNumbers], tuple[Matrix, ...]] | None = None
+    double: Callable[[AnyNumbers], Matrices] | None = None
 
     def __repr__(self) -> str:
         return f"Model(name={self.name!r}, title={self.title!r}, degree={self.degree}, natural={self.natural})"

@@ -111,12 +111,9 @@ def _rows(written: Any, key: str, fault: Callable[..., None]) -> Matrix:
         if not isinstance(row, list) or not row:
             fault(f"found {short(row)}; {_DESCENDING}", key)
             return []
-    return [[_entry(x, key, i, j, fault) for j, x in enumerate(row, start=1)] for i, row in enumerate(rows, start=1)]
-
-
-def _entry(x: Any, key: str, i: int, j: int, fault: Callable[..., None]) -> Any:
-    if is_number(x) or isinstance(x, str):
-        return x
-    where = place(key, i, j)
-    fault(f"{where}: found {short(x)}; accepted: a finite number, or an expression in quotes", key)
-    return 0
+    for i, row in enumerate(rows, start=1):
+        for j, x in enumerate(row, start=1):
+            if not is_number(x) and not isinstance(x, str):
+                found = f"{place(key, i, j)}: found {short(x)}"
+                fault(f"{found}; accepted: a finite number, or an expression in quotes", key)
+    return [[x if is_number(x) or isinstance(x, str) else 0 for x in row] for row in rows]

@@ -92,17 +92,19 @@ def _damping_ratio(values: AnyNumbers) -> float:
     return min(ratios, default=math.nan)
 
 
-def _angular_frequency(values: AnyNumbers) -> float:
-    return max((abs(r.im) for r in values["structure"].roots), default=math.nan)
-
-
 ANGULAR_FREQUENCY = "angular_frequency"
 """Angular frequency of the fastest oscillation; 0 if all roots are real."""
 
 ROOT_QUANTITIES = (
     Quantity("abscissa", "1", "largest real part of the roots", r"\alpha", lambda v: float(v["structure"].abscissa)),
     Quantity("damping_ratio", "1", "least −Re s/|s| over the roots", r"\zeta", _damping_ratio),
-    Quantity(ANGULAR_FREQUENCY, "1", "greatest |Im s| over the roots", r"\omega", _angular_frequency),
+    Quantity(
+        ANGULAR_FREQUENCY,
+        "1",
+        "greatest |Im s| over the roots",
+        r"\omega",
+        lambda v: max((abs(r.im) for r in v["structure"].roots), default=math.nan),
+    ),
 )
 """Root quantities, each the worst over the cases of a problem."""
 

@@ -10,7 +10,17 @@ from operator import add
 from typing import Any, NamedTuple
 
 from tmsopt.algebra.kinds import absolute, pi, quotient, sqrt
-from tmsopt.models.model import Feedback, Matrix, Model, NumberFunction, Parameter, ParameterSet, Quantity, Range
+from tmsopt.models.model import (
+    Feedback,
+    Matrices,
+    Matrix,
+    Model,
+    NumberFunction,
+    Parameter,
+    ParameterSet,
+    Quantity,
+    Range,
+)
 from tmsopt.records import AnyNumbers
 from tmsopt.roots.polynomial import determinant
 
@@ -80,7 +90,7 @@ class ControllableBicycle:
     """
 
     model: Model
-    matrices: Callable[[AnyNumbers], tuple[Matrix, Matrix, Matrix]]
+    matrices: Callable[[AnyNumbers], Matrices]
     unit: Callable[[AnyNumbers, Any], tuple[Any, Any]]
     speed: str
 
@@ -145,7 +155,7 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
         assert base.pencil is not None
         return Feedback(base.pencil(p)[0], gains(p), p[native(LAG)] if has_lag else None, driven)
 
-    def pencil(p: AnyNumbers) -> tuple[Matrix, ...]:
+    def pencil(p: AnyNumbers) -> Matrices:
         assert base.pencil is not None
         M, D, K = base.pencil(p)
         G = gains(p)
@@ -183,7 +193,7 @@ def _multiply_by_lag(lag: Any, entry: list[Any]) -> list[Any]:
     return [lag * a, a + lag * b, b + lag * c, c]
 
 
-def _first_order(M: Matrix, D: Matrix, K: Matrix, G: Matrix, lag: Any, driven: tuple[int, ...]) -> tuple[Matrix, ...]:
+def _first_order(M: Matrix, D: Matrix, K: Matrix, G: Matrix, lag: Any, driven: tuple[int, ...]) -> Matrices:
     """I and −A for the states φ, δ, φ′, δ′ and the lagging torques."""
     (a, b), (c, d) = M
     size = a * d - b * c

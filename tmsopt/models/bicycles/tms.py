@@ -10,7 +10,7 @@ from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS
 from tmsopt.models.bicycles.tables import parameters, quantities
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.bicycles.tms_quantities import COMPUTED
-from tmsopt.models.model import Matrix, Model, ParameterSet
+from tmsopt.models.model import Matrices, Model, ParameterSet
 from tmsopt.models.tables import read_table
 from tmsopt.records import AnyNumbers
 
@@ -78,7 +78,7 @@ def to_si(p: AnyNumbers, w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) -> dict
     return {**own, **{n: p[native_name(n)] * si_scale(n, own, _rate, _torque) for n in FEEDBACK if native_name(n) in p}}
 
 
-def _pencil(p: AnyNumbers) -> tuple[Matrix, ...]:
+def _pencil(p: AnyNumbers) -> Matrices:
     """M, V, P from tan λ_s alone: cos λ_s = 1/√(1 + tan² λ_s) on the open interval of tilts."""
     T = tan(p["lambda_s"])
     cosine = 1 / sqrt(1 + T * T)
@@ -133,7 +133,7 @@ tms = Model(
 """The two-mass-skate bicycle."""
 
 
-def _scaled_matrices(p: AnyNumbers) -> tuple[Matrix, Matrix, Matrix]:
+def _scaled_matrices(p: AnyNumbers) -> Matrices:
     """M, V, P for a steer angle in units of 1/cos λ_s."""
     return matrices(**_without_tilt(p), sine=p["T"], cosine=1)
 

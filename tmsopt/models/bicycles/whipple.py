@@ -13,7 +13,7 @@ from tmsopt.models.bicycles.sketches import CONVENTIONS, WHIPPLE
 from tmsopt.models.bicycles.tables import parameters, quantities
 from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, tangent_matrices
 from tmsopt.models.bicycles.whipple_quantities import COMPUTED, IN_MATRICES, algebraic, canonical
-from tmsopt.models.model import Matrix, Model, ParameterSet
+from tmsopt.models.model import Matrices, Matrix, Model, ParameterSet
 from tmsopt.models.tables import read_table
 from tmsopt.records import AnyNumbers
 
@@ -32,12 +32,12 @@ _SI = ParameterSet(
 )
 
 
-def _pencil(p: AnyNumbers) -> tuple[Matrix, ...]:
+def _pencil(p: AnyNumbers) -> Matrices:
     """M, v C1 and g K0 + v² K2."""
     return _matrices_at_speed(*canonical(p), p["v"], p["g"])
 
 
-def _matrices_at_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix, v: Any, g: Any) -> tuple[Matrix, Matrix, Matrix]:
+def _matrices_at_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix, v: Any, g: Any) -> Matrices:
     D = [[v * e for e in row] for row in C1]
     return M, D, [[g * a + v * v * b for a, b in zip(*rows, strict=True)] for rows in zip(K0, K2, strict=True)]
 
@@ -59,7 +59,7 @@ whipple = Model(
 """The Carvallo–Whipple bicycle; its roots are in 1/s."""
 
 
-def _scaled_matrices(p: AnyNumbers) -> tuple[Matrix, Matrix, Matrix]:
+def _scaled_matrices(p: AnyNumbers) -> Matrices:
     """M, v C1 and g K0 + v² K2 for a steer angle in units of w/cos λ_s."""
     return _matrices_at_speed(*tangent_matrices(**{name: p[name] for name in ("T", *IN_MATRICES)}), p["v"], p["g"])
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.models.model import Matrix
+from tmsopt.models.model import Matrices, Matrix
 from tmsopt.models.stated.pairs import Pair, pair
 from tmsopt.roots.polynomial import characteristic_polynomial, product, quadratic_pencil
 
@@ -48,7 +48,7 @@ def _add_carrier(R: Matrix, carrier: float) -> Matrix:
     return [[x + Fraction(carrier) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(R)]
 
 
-def pencil(blocks: dict[str, Matrix], carrier: float = 0.0) -> tuple[Matrix, ...]:
+def pencil(blocks: dict[str, Matrix], carrier: float = 0.0) -> Matrices:
     """Matrices of the matrix polynomial with these roots, in descending powers; for H those of the real system."""
     if "H" in blocks:
         R, J = blocks["H"], blocks[IMAGINARY]

@@ -28,7 +28,7 @@ from tmsopt.algebra.identity import Field
 from tmsopt.algebra.kinds import BALLS, NODES, values
 from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
-from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
+from tmsopt.models.model import Matrices, Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, name_fault, number_text, spell_formula
 from tmsopt.models.stated.closed_loop import LOOP, check_loop, close_loop
 from tmsopt.models.stated.degree import first_fault
@@ -274,7 +274,7 @@ def _function(x: Any, names: Sequence[str]) -> Callable[[AnyNumbers], Any]:
     return lambda given: values(own, given)[0]
 
 
-def _matrices(rows: Sequence[Matrix], names: Sequence[str]) -> Callable[[AnyNumbers], tuple[Matrix, ...]]:
+def _matrices(rows: Sequence[Matrix], names: Sequence[str]) -> Callable[[AnyNumbers], Matrices]:
     """A function from named numbers to matrices, for matrices of nodes."""
     n, own = len(rows[0]), formula((x for P in rows for row in P for x in row), names)
     shapes = [(str(k), n, n) for k in range(len(rows))]
