@@ -1,8 +1,8 @@
 """Parser of the entries and quantities of a system in text, which share their symbols."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
-from types import MappingProxyType
 from typing import Any
 
 from tmsopt.algebra.formula import Kind, symbol
@@ -13,7 +13,7 @@ from tmsopt.models.model import Matrix
 from tmsopt.models.names import name_fault
 from tmsopt.models.stated.degree import DEGREES, Degree, DegreeTooHigh
 from tmsopt.models.stated.pairs import IMAGINARY_UNIT, PAIRS, entry_pair, pair, replace_literals, restore_literals
-from tmsopt.records import AnyNumbers
+from tmsopt.records import Table
 
 MOST_QUANTITIES = 500
 """More would take seconds to parse."""
@@ -47,33 +47,26 @@ class Unfit(ValueError):
         return f"{self.key}: {self.message}"
 
 
+@dataclass
 class Texts:
     """Turns the texts of one system into nodes.
 
     Attributes:
-        names: names in the texts so far.
-
-    Args:
         fault: called with a message and its place: ``M``, or ``quantities`` and a name.
-        known: quantities that are not texts.
+        known: quantities that are not texts, and those already built.
         kind: kind of numbers for entries.
         constants: names with a fixed value in it.
+        names: names in the texts so far.
     """
 
-    def __init__(
-        self,
-        fault: Callable[..., None],
-        known: AnyNumbers | None = None,
-        kind: Kind = NODES,
-        constants: AnyNumbers = MappingProxyType({}),
-    ) -> None:
-        self.fault = fault
-        self.kind, self.constants = kind, constants
-        self.names: dict[str, None] = {}
-        self.known = dict(known or {})
-        self.expressions: dict[str, Expression | None] = {}
-        self._degrees: dict[str, Degree] = {}
-        self._order: tuple[str, ...] = ()
+    fault: Callable[..., None]
+    known: dict[str, Any]
+    kind: Kind = NODES
+    constants: Mapping[str, Any] = Table()
+    names: dict[str, None] = field(default_factory=dict)
+    expressions: dict[str, Expression | None] = field(default_factory=dict)
+    _degrees: dict[str, Degree] = field(default_factory=dict)
+    _order: tuple[str, ...] = ()
 
     def entry(self, text: str, key: str, where: str) -> Any:
         """One entry as a number of the kind; 0 if it has a fault."""
@@ -154,9 +147,9 @@ def parse_entries(
     """Matrices and quantities with nodes in place of texts; every entry of a complex H becomes a pair."""
     in_text = {n: x for n, x in derived.items() if isinstance(x, str)}
     known, of_H = {n: x for n, x in derived.items() if n not in in_text}, "H" in matrices
-    texts = Texts(fault, known)
+    texts = Texts(fault, dict(known))
     if of_H:
-        texts = Texts(lambda message, *key: fault(restore_literals(message), *key), known, PAIRS, IMAGINARY_UNIT)
+        texts = Texts(lambda message, *key: fault(restore_literals(message), *key), dict(known), PAIRS, IMAGINARY_UNIT)
     texts.read_quantities(in_text)
 
     def entry(x: Any, n: str, i: int, j: int) -> Any:
