@@ -39,10 +39,11 @@ def read_numbers(tables: AnyNumbers, of: ParameterSet) -> tuple[dict[str, Any], 
         if unit == "1" and sizes:
             unit = of[name].multiple_of or unit  # 5 mm is 0.005 of a wheelbase of 1 m
         try:
+            found: Any
             if isinstance(value, str):
                 found, written, exact = parse_exact_quantity(value, unit)
             else:
-                found, written, exact = float(value), "", Exact.from_fraction(Fraction(value))
+                found, written, exact = value, "", Exact.from_fraction(Fraction(value))
             if not sizes and exact and exact.fraction != decimal(float(found)):
                 typed.setdefault(name, {})[float(found)] = str(exact)
         except OverflowError:  # an integer too large for a double
