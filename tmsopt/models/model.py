@@ -176,7 +176,7 @@ class Quantity:
 class _Symbols(dict[str, Any]):
     """Maps every name to its symbol."""
 
-    def __missing__(self, name: str) -> Any:
+    def __getitem__(self, name: str) -> Any:
         return symbol(name)
 
     def __contains__(self, name: object) -> bool:
