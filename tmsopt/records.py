@@ -24,6 +24,9 @@ Truth = NDArray[np.bool_]
 Numbers = Mapping[str, float]
 """Name → number, such as the parameters of a design."""
 
+AnyNumbers = Mapping[str, Any]
+"""Name → number of any kind: a float, an array, a ball, an expression."""
+
 
 class Printable(Protocol):
     """A result that prints and draws itself. `tmsopt.documents`, imported on first use, writes it."""

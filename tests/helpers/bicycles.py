@@ -128,3 +128,23 @@ def appendix(p, sine, cosine):
         [[m_T * z_T, -S_A], [-S_A, -S_A * sine]],
         [[0, (S_T - m_T * z_T) * k], [0, (S_A + S_F * sine) * k]],
     )
+
+
+def matrices(p):
+    """M, C1, g K0, K2 of parameters that may be arrays: 2 × 2 in the last two axes."""
+    found = appendix(p, np.sin(p["lambda_s"]), np.cos(p["lambda_s"]))
+    one = np.ones(np.broadcast(*(p[n] for n in BODIES.split())).shape)
+    M, C1, K0, K2 = (np.moveaxis(np.array([[x * one for x in row] for row in A]), (0, 1), (-2, -1)) for A in found)
+    return M, C1, p.get("g", 9.81) * K0, K2
+
+
+def abscissa(p, v, gains=(0.0, 0.0, 0.0, 0.0)):
+    """Largest real part of the eigenvalues, of every design or row of gains at once."""
+    M, C1, gK0, K2 = matrices(p)
+    v, k = np.asarray(v, dtype=float)[..., None, None], np.asarray(gains)
+    nothing = np.zeros(k.shape[:-1])
+    K = gK0 + v**2 * K2 + np.moveaxis(np.array([[nothing, nothing], [k[..., 0], k[..., 2]]]), (0, 1), (-2, -1))
+    D = v * C1 + np.moveaxis(np.array([[nothing, nothing], [k[..., 1], k[..., 3]]]), (0, 1), (-2, -1))
+    below = -np.linalg.solve(M, np.concatenate(np.broadcast_arrays(K, D), axis=-1))
+    above = np.broadcast_to(np.eye(2, 4, k=2), below.shape)
+    return np.linalg.eigvals(np.concatenate([above, below], axis=-2)).real.max(axis=-1)

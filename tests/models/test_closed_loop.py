@@ -25,7 +25,7 @@ def test_first_order(n, inputs, measured):
     )
 
 
-@pytest.mark.parametrize(("n", "inputs"), [(1, 1), (2, 1), (3, 2)])
+@pytest.mark.parametrize(("n", "inputs"), {1: 1, 2: 1, 3: 2}.items())
 @pytest.mark.parametrize("damped", [True, False])
 def test_second_order(n, inputs, damped):
     K, D, B, G = (RNG.normal(size=s) for s in ((n, n), (n, n), (n, inputs), (inputs, 2 * n)))

@@ -2,14 +2,17 @@
 
 import math
 import pickle
+import re
 
 import casadi as ca
 import numpy as np
 import pytest
+from helpers.texts import faults
 
 import tmsopt
 from tmsopt.models import Unfit, from_hamiltonian
 
+FIXED = {"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2}
 DIMER = [["w1 - 1j*g1", "k"], ["k", "w2 - 1j*g2"]]
 
 
@@ -53,7 +56,7 @@ def test_a_rotating_frame_has_no_false_meeting():
     found = tmsopt.solve(tmsopt.Problem(model, fixed=opposite))
     assert found.structure == "two singles"
     assert [z.multiplicity for z in found.roots] == [1, 1]
-    overdamped = tmsopt.solve(tmsopt.Problem(model, fixed={"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2, "k": 0.1}))
+    overdamped = tmsopt.solve(tmsopt.Problem(model, fixed={**FIXED, "k": 0.1}))
     assert (overdamped.structure, [z.multiplicity for z in overdamped.roots]) == ("single", [1, 1])
     gap = math.sqrt(0.4**2 - 0.1**2)
     assert [z.re for z in overdamped.roots] == pytest.approx([-0.6 + gap, -0.6 - gap], abs=1e-14)
@@ -81,8 +84,7 @@ def test_the_carrier_is_no_part_of_the_problem():
     free = {"k": (0.1, 2.0)}
 
     def stated():
-        fixed = {"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2}
-        return tmsopt.Problem(from_hamiltonian(DIMER), fixed=fixed, free=free, locate="EP2")
+        return tmsopt.Problem(from_hamiltonian(DIMER), fixed=FIXED, free=free, locate="EP2")
 
     one, other = stated(), stated()
     assert one == other
@@ -168,34 +170,29 @@ def test_what_is_refused_is_told(H, words):
 
 @pytest.mark.parametrize(
     ("table", "words"),
-    [
-        ('H = [["w"]]\nA = [["w"]]', "together with A; keep H, a complex system"),
-        ('H = [["1j*w", 1]]', "found rows of 2 entries"),
-        ('H = [["w - 2j*"]]', "'w - 2j*' does not parse"),
-        ('H = "w"', "accepted: rows in brackets"),
-        ('A = [["1j*w"]]', "only the matrix H may be complex"),
-    ],
+    {
+        'H = [["w"]]\nA = [["w"]]': "together with A; keep H, a complex system",
+        'H = [["1j*w", 1]]': "found rows of 2 entries",
+        'H = [["w - 2j*"]]': "'w - 2j*' does not parse",
+        'H = "w"': "accepted: rows in brackets",
+        'A = [["1j*w"]]': "only the matrix H may be complex",
+    }.items(),
 )
 def test_a_file_is_refused_at_its_line(tmp_path, table, words):
-    path = tmp_path / "own.toml"
-    path.write_text(f"[model]\n{table}\n[parameters]\nw = 1\n", encoding="utf-8")
-    with pytest.raises(tmsopt.InputError, match=r"own\.toml:[23]: model\.[AH]") as refused:
-        tmsopt.load(path)
-    assert words in str(refused.value)
+    found = faults(tmp_path, f"[model]\n{table}\n[parameters]\nw = 1\n")
+    assert any(re.match(r"[23]: model\.[AH]", fault) and words in fault for fault in found)
 
 
 @pytest.mark.parametrize("asked", ["damping_ratio", "angular_frequency"])
 def test_what_has_no_meaning_in_a_rotating_frame_is_not_offered(asked):
-    fixed = {"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2}
     with pytest.raises(tmsopt.InputError, match="rotating frame"):
-        tmsopt.Problem(from_hamiltonian(DIMER), fixed=fixed, free={"k": (0.1, 2)}, maximize=asked)
+        tmsopt.Problem(from_hamiltonian(DIMER), fixed=FIXED, free={"k": (0.1, 2)}, maximize=asked)
 
 
 @pytest.mark.parametrize("name", ["CEP2", "EP3", "capsize"])
 def test_patterns_are_those_of_the_matrix(name):
-    fixed = {"w1": 0.0, "w2": 0.0, "g1": 1.0, "g2": 0.2}
     with pytest.raises(tmsopt.InputError, match="EP2 weave resonance"):
-        tmsopt.Problem(from_hamiltonian(DIMER), fixed=fixed, free={"k": (0.1, 2)}, locate=name)
+        tmsopt.Problem(from_hamiltonian(DIMER), fixed=FIXED, free={"k": (0.1, 2)}, locate=name)
 
 
 @pytest.mark.parametrize("H", [[["x", 0], [0, 0]], [["x", "x"], [0, "x"]], [[0, 1], [0, "x"]]])

@@ -5,12 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from helpers.bicycles import BODIES, appendix
+from helpers.bicycles import BODIES, abscissa as abscissa_of
+from helpers.texts import write
 
 import tmsopt
 from benchmarks.judges.whipple import largest_real_part
-from tmsopt.cli import every as main
 from tmsopt.models import inertia_margin
 
 ROBOT = {
@@ -33,10 +32,7 @@ NOTHING = dict.fromkeys(BODIES.split(), 0.0) | {"r_R": 1.0, "r_F": 1.0}
 
 def abscissa(p, **inertia):
     """In 1/s, by eigenvalues of the matrices of appendix A without wheels and trail."""
-    M, C1, K0, K2 = map(np.array, appendix(NOTHING | p | inertia, np.sin(p["lambda_s"]), np.cos(p["lambda_s"])))
-    D, K = p["v"] * C1, p["g"] * K0 + p["v"] ** 2 * K2
-    A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
-    return np.linalg.eigvals(A).real.max()
+    return abscissa_of(NOTHING | p | inertia, p["v"])
 
 
 def test_the_robot_of_point_masses():
@@ -91,37 +87,29 @@ def test_a_controller_has_its_part(gains, least):
 FILE = "[parameters]\n" + "\n".join(f"{n} = {x!r}" for n, x in ROBOT.items()) + "\n"
 
 
-def test_report_and_json_have_it(tmp_path):
-    file = tmp_path / "robot.toml"
-    file.write_text(FILE)
-    data = json.loads(CliRunner().invoke(main, ["solve", str(file), "--json"]).stdout)
-    assert data["inertia_margin"] == dict(inertia_margin(ROBOT))
-    text = " ".join(CliRunner().invoke(main, ["solve", str(file)]).stdout.split())
-    radius = 100 * math.sqrt(data["inertia_margin"]["I_Hzz"] / 6)
-    assert f"I_Hzz {data['inertia_margin']['I_Hzz']:.4g} kg m^2 ({radius / 100:.3g} m)" in text
+def test_report_and_json_have_it(tmp_path, run):
+    file = write(tmp_path, FILE)
+    margin = json.loads(run("solve", file, "--json")[1])["inertia_margin"]
+    assert margin == dict(inertia_margin(ROBOT))
+    text = " ".join(run("solve", file)[1].split())
+    assert f"I_Hzz {margin['I_Hzz']:.4g} kg m^2 ({math.sqrt(margin['I_Hzz'] / 6):.3g} m)" in text
     assert "I_Bzz none" in text
     assert "without wheels, rotational inertia or trail" in text
 
 
-def test_a_design_that_is_not_stable_has_none(tmp_path):
-    file = tmp_path / "robot.toml"
-    file.write_text(FILE.replace("v = 3.7", "v = 1.7"))
-    found = CliRunner().invoke(main, ["solve", str(file), "--json"])
-    assert json.loads(found.stdout)["inertia_margin"] is None
-    assert "radius of gyration" not in CliRunner().invoke(main, ["solve", str(file)]).stdout
+def test_a_design_that_is_not_stable_has_none(tmp_path, run):
+    file = write(tmp_path, FILE.replace("v = 3.7", "v = 1.7"))
+    assert json.loads(run("solve", file, "--json")[1])["inertia_margin"] is None
+    assert "radius of gyration" not in run("solve", file)[1]
 
 
 @pytest.mark.slow
 def test_who_says_what_is_left_out():
     words = "without wheels, rotational inertia or trail"
     design = tmsopt.solve("problems/benchmark.toml")
-    told = [design.report(), str(tmsopt.speeds(design)), str(tmsopt.simulate(design)), str(tmsopt.describe("tms"))]
-    told += [
-        str(tmsopt.compare(design)),
-        tmsopt.solve("problems/ep4.toml").report(full=True),
-        tmsopt.explore(design).html,
-    ]
-    assert [words in " ".join(text.split()) for text in told] == [True] * 7
+    told = [design, tmsopt.speeds(design), tmsopt.simulate(design), tmsopt.describe("tms"), tmsopt.compare(design)]
+    told += [tmsopt.solve("problems/ep4.toml").report(full=True), tmsopt.explore(design).html]
+    assert [words in " ".join(str(text).split()) for text in told] == [True] * 7
     assert "inertia_margin" not in tmsopt.solve("problems/ep4.toml").to_json()
     assert "model: " not in tmsopt.solve("problems/whipple_benchmark.toml").report()
 
@@ -146,14 +134,7 @@ def test_the_delivery_robot_balances_as_built():
 
     def greatest(how):
         """The greatest real part of robots, a row of errors each, as parts of the largest."""
-        built = p | {n: p[n] + how[:, k] * errors[k] for k, n in enumerate(names)}
-        sine, cosine = np.sin(built["lambda_s"]), np.cos(built["lambda_s"])
-        M, C1, K0, K2 = ([[x + 0 * sine for x in row] for row in rows] for rows in appendix(built, sine, cosine))
-        M, C1, K0, K2 = (np.moveaxis(np.array(rows), -1, 0) for rows in (M, C1, K0, K2))
-        D, K = p["v"] * C1, p["g"] * K0 + p["v"] ** 2 * K2
-        above = np.concatenate([np.zeros_like(M), np.eye(2) + np.zeros_like(M)], axis=2)
-        A = np.concatenate([above, -np.linalg.solve(M, np.concatenate([K, D], axis=2))], axis=1)
-        return np.linalg.eigvals(A).real.max(axis=1)
+        return abscissa_of(p | {n: p[n] + how[:, k] * errors[k] for k, n in enumerate(names)}, p["v"])
 
     rng = np.random.default_rng(0)
     assert greatest(rng.uniform(-1, 1, (4_000, len(names)))).max() < -1

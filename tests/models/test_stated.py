@@ -7,12 +7,11 @@ from fractions import Fraction
 import casadi as ca
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from helpers.texts import faults, load, write
 from matplotlib.mathtext import MathTextParser
 from scipy.optimize import differential_evolution
 
 import tmsopt
-from tmsopt.cli import every as main
 from tmsopt.models import CONSTANTS, FUNCTIONS, TAKEN, Unfit, from_coefficients, from_matrices, latex
 from tmsopt.problem import ROOT_NAMES
 from tmsopt.studies import definition
@@ -53,23 +52,6 @@ PARAMETERS = "\n[parameters]\nk = { min = 1, max = 2 }\n"
 k, c = ca.SX.sym("k"), ca.SX.sym("c")
 
 
-def written(folder, text, name="own"):
-    file = folder / f"{name}.toml"
-    file.write_text(text, encoding="utf-8")
-    return file
-
-
-def loaded(folder, text):
-    return tmsopt.load(written(folder, text))
-
-
-def command(*arguments):
-    """A command's result; it may end as it likes, but not in a traceback."""
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exc_info
-    return result
-
-
 def eigenvalues(M, D, K):
     """Roots of det(M s² + D s + K) as eigenvalues of the first companion form."""
     n = len(M)
@@ -83,7 +65,7 @@ def eigenvalues(M, D, K):
 
 def test_pendulums_of_a_file_are_solved(tmp_path):
     """The optimum is not beaten by differential evolution on NumPy's eigenvalues, and is met by it to 1e-7."""
-    problem = loaded(tmp_path, PENDULUMS)
+    problem = load(tmp_path, PENDULUMS)
     design = tmsopt.solve(problem)
 
     def matrices(k1, c1, c2):
@@ -196,7 +178,7 @@ def test_singular_mass_matrices():
 
 
 def test_quantities_may_use_one_another_and_stand_in_entries(tmp_path):
-    problem = loaded(
+    problem = load(
         tmp_path,
         """
 [model]
@@ -226,20 +208,20 @@ def test_numbers_of_a_model_are_told_apart_in_full():
 
 @pytest.mark.parametrize(
     ("name", "symbol"),
-    [
-        ("a1", "a_{1}"),
-        ("gamma", r"\gamma"),
-        ("beta1", r"\beta_{1}"),
-        ("mu_r", r"\mu_{r}"),
-        ("W", "W"),
-        ("k_max", r"k_{\mathrm{max}}"),
-        ("m_1_a_b", "m_{1,a,b}"),
-        ("lambda_", r"\lambda"),
-        ("x__1", "x_{1}"),
-        ("CamelCase", r"\mathrm{CamelCase}"),
-        ("rho10b", r"\mathrm{rho10b}"),
-        ("I1", "I_{1}"),
-    ],
+    {
+        "a1": "a_{1}",
+        "gamma": r"\gamma",
+        "beta1": r"\beta_{1}",
+        "mu_r": r"\mu_{r}",
+        "W": "W",
+        "k_max": r"k_{\mathrm{max}}",
+        "m_1_a_b": "m_{1,a,b}",
+        "lambda_": r"\lambda",
+        "x__1": "x_{1}",
+        "CamelCase": r"\mathrm{CamelCase}",
+        "rho10b": r"\mathrm{rho10b}",
+        "I1": "I_{1}",
+    }.items(),
 )
 def test_names_as_symbols(name, symbol):
     assert latex(name) == symbol
@@ -265,7 +247,7 @@ def test_no_name_is_taken_twice():
         (f"M = [[1{'0' * 400}]]\nK = [['k']]", 2, "accepted: a finite number"),
         ("coefficients = ['1', '1/0', 'k']", 2, "entry 2: '1/0' divides by 0; accepted: parts with"),
         ("coefficients = ['1', 'sqrt(-1)', 'k']", 2, "entry 2: 'sqrt(-1)' is nan"),
-        ("coefficients = ['1', '1/(k - k)', 'k']", 2, "entry 2: contains inf"),
+        ("coefficients = ['1', '1/(k - k)', 'k']", 2, "entry 2: '1/(k - k)' contains inf"),
         ("coefficients = ['1', '10**400*k']", 2, "entry 2"),
         ("coefficients = ['1']", 2, "found 1 entries; accepted: a list of 2 to 13"),
         (f"coefficients = [{', '.join(14 * ['1'])}]", 2, "found 14 entries"),
@@ -298,25 +280,21 @@ def test_no_name_is_taken_twice():
     ],
 )
 def test_a_statement_that_makes_no_model_is_placed(tmp_path, statement, line, said):
-    file = written(tmp_path, f"[model]\n{statement}\n{PARAMETERS}")
-    with pytest.raises(tmsopt.InputError) as caught:
-        tmsopt.load(file)
-    text = next(t for t in str(caught.value).splitlines() if said in t)
-    assert text.startswith(f"{file}:{line}: model")
+    found = next(t for t in faults(tmp_path, f"[model]\n{statement}\n{PARAMETERS}") if said in t)
+    assert found.startswith(f"{line}: model")
 
 
 @pytest.mark.parametrize(
     ("model", "said"),
-    [
-        ("model = 'nonsense'", "unknown model 'nonsense'"),
-        ("model = 3", "found 3; accepted: the name of a model"),
-        ("[[model]]\nname = 'x'", "accepted: the name of a model in quotes, or a table"),
-        ("model = 'tms'\n[model]\nname = 'x'", "not TOML"),
-    ],
+    {
+        "model = 'nonsense'": "unknown model 'nonsense'",
+        "model = 3": "found 3; accepted: the name of a model",
+        "[[model]]\nname = 'x'": "accepted: the name of a model in quotes, or a table",
+        "model = 'tms'\n[model]\nname = 'x'": "not TOML",
+    }.items(),
 )
 def test_what_is_no_model(tmp_path, model, said):
-    with pytest.raises(tmsopt.InputError, match=said):
-        loaded(tmp_path, model + PARAMETERS)
+    assert any(said in found for found in faults(tmp_path, model + PARAMETERS))
 
 
 def test_lines_below_matrices_of_several_lines(tmp_path):
@@ -334,10 +312,8 @@ K = [["k", "0"],
 [parameters]
 k = 1
 """
-    with pytest.raises(tmsopt.InputError) as caught:
-        loaded(tmp_path, text)
-    places = [(f.line, f.key[-1]) for f in caught.value.faults]
-    assert places == [(6, "note"), (9, "K")]
+    found = [text.split(": ")[:2] for text in faults(tmp_path, text)]
+    assert found == [["6", "model.note"], ["9", "model.K"]]
 
 
 @pytest.mark.parametrize(
@@ -388,7 +364,7 @@ def test_no_parameter_is_a_reserved_word():
 
 def test_parameters_named_like_coefficients(tmp_path):
     """The parameter or quantity keeps the name, and a chart is of the true coefficients."""
-    problem = loaded(
+    problem = load(
         tmp_path,
         """
 [model]
@@ -407,7 +383,7 @@ a3 = 0.5
     assert [float(values[n]) for n in ("a0", "a1", "coefficient0", "coefficient1")] == [2, 1, 1, 2]
 
 
-def test_one_root(tmp_path):
+def test_one_root(tmp_path, run):
     """m s + a: the abscissa −a/m is least at a = 2 with m a = 1, and nothing is asked of pairs that are not there."""
     text = """
 [model]
@@ -420,29 +396,29 @@ minimize = "abscissa"
 [constraints]
 product = "m*a >= 1"
 """
-    file = written(tmp_path, text)
+    file = write(tmp_path, text)
     design = tmsopt.solve(tmsopt.load(file))
     assert design.abscissa == pytest.approx(-4, abs=1e-9)
-    result = command("solve", file)
-    assert result.exit_code == 0
-    assert "robustness: a change of 100 % makes it unstable (divergence)" in result.output
-    assert command("prove", file).exit_code == 0
+    code, out, _ = run("solve", file)
+    assert code == 0
+    assert "robustness: a change of 100 % makes it unstable (divergence)" in out
+    assert run("prove", file)[0] == 0
 
 
 def test_coefficients_without_a_value_somewhere(tmp_path):
     """s² + s/x + 1 has its EP2 at x = 1/2; the box holds the pole x = 0 in its middle."""
     text = "[model]\ncoefficients = [1, '1/x', 1]\n[parameters]\nx = {{ min = {}, max = 1 }}\n[objective]\nminimize = 'abscissa'"
     for least in (0, -1):
-        design = tmsopt.solve(loaded(tmp_path, text.format(least)))
+        design = tmsopt.solve(load(tmp_path, text.format(least)))
         assert (design.structure, design.parameters["x"]) == ("EP2", pytest.approx(0.5, abs=1e-12))
 
 
-def test_coefficients_without_a_value_anywhere(tmp_path):
+def test_coefficients_without_a_value_anywhere(tmp_path, run):
     text = "[model]\ncoefficients = [1, 'sqrt(x)', 1]\n[parameters]\nx = { min = -2, max = -1 }\n[objective]\nminimize = 'abscissa'"
-    result = command("solve", written(tmp_path, text))
-    assert result.exit_code == 3
-    assert "violated: coefficients (must have values)" in result.output
-    assert "a coefficient has no value at this design" in result.output
+    code, out, _ = run("solve", write(tmp_path, text))
+    assert code == 3
+    assert "violated: coefficients (must have values)" in out
+    assert "a coefficient has no value at this design" in out
 
 
 @pytest.mark.parametrize("size", [1e6, 1e-6])
@@ -472,29 +448,29 @@ def test_small_roots_of_a_stiff_system_are_not_called_double():
         assert found.abscissa == pytest.approx(-slow / 2 + np.sqrt(slow**2 / 4 - 2), abs=1e-7)
 
 
-def test_a_study_is_not_gone_on_with_after_the_model_changed(tmp_path):
+def test_a_study_is_not_gone_on_with_after_the_model_changed(tmp_path, run):
     own = "[model]\ncoefficients = [1, 'x', '{}*y']\n[parameters]\nx = {{ min = 0, max = 9 }}\ny = 1\n[objective]\nminimize = 'abscissa'"
-    study = written(tmp_path, "problem = 'own.toml'\n[study]\nmethod = 'grid'\n[vary]\ny = [1, 4]\n", "study")
+    study = write(tmp_path, "problem = 'problem.toml'\n[study]\nmethod = 'grid'\n[vary]\ny = [1, 4]\n", "study")
     store = tmp_path / "rows.sqlite"
-    written(tmp_path, own.format("1"))
-    assert command("study", study, "--store", store).exit_code == 0
+    write(tmp_path, own.format("1"))
+    assert run("study", study, "--store", store)[0] == 0
     rows = tmsopt.run_study(tmsopt.load_study(study), store)
     assert np.allclose(rows.column("abscissa"), [-1, -2], atol=1e-12)
     first = definition(tmsopt.load_study(study))
-    written(tmp_path, own.format("1.000000001"))
+    write(tmp_path, own.format("1.000000001"))
     assert definition(tmsopt.load_study(study)) != first
-    result = command("study", study, "--store", store)
-    assert result.exit_code == 2
-    assert 'coefficients[0][2]: "y" in the store, "(1.000000001 * y)" in the file' in result.output
+    code, out, err = run("study", study, "--store", store)
+    assert code == 2
+    assert 'coefficients[0][2]: "y" in the store, "(1.000000001 * y)" in the file' in out + err
 
 
-def test_a_chart_is_not_gone_on_with_after_the_model_changed(tmp_path):
+def test_a_chart_is_not_gone_on_with_after_the_model_changed(tmp_path, run):
     own = "[model]\ncoefficients = [1, 'x', 'y', '{}']\n[parameters]\nx = {{ min = 0, max = 9 }}\ny = {{ min = 0, max = 9 }}"
     folder = tmp_path / "plane.chart"
     for written_as, status in (("1", 0), ("1", 0), ("1.0000001", 2)):
-        result = command("chart", written(tmp_path, own.format(written_as)), "--points", "20", "--output", folder)
-        assert result.exit_code == status, result.output
-    assert '"1.0000001"' in result.output
+        code, out, err = run("chart", write(tmp_path, own.format(written_as)), "--points", "20", "--output", folder)
+        assert code == status, err
+    assert '"1.0000001"' in out + err
 
 
 def test_axes_beside_layers_of_the_same_name(tmp_path):

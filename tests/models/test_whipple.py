@@ -10,13 +10,12 @@ import flint
 import mpmath
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from helpers.bicycles import BENCHMARK, appendix, bicycles
+from helpers.designs import designs
 from mpmath import mp
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.cli import every as main
 from tmsopt.dynamics import find_crossings
 from tmsopt.models import MODELS, Values, canonical, copo, problem_text, spin, to_si, whipple
 from tmsopt.roots import exact_roots, quadratic_pencil
@@ -106,20 +105,6 @@ def test_matrices_are_those_of_the_appendix():
 # The limit: no wheels, no trail
 
 
-def skates(count, seed=5):
-    rng = np.random.default_rng(seed)
-    for _ in range(count):
-        yield {
-            "Fr": rng.uniform(0.1, 5),
-            "mu": 10 ** rng.uniform(-1, 1),
-            "chi_B": rng.uniform(-1, 3),
-            "chi_H": rng.uniform(-1, 3),
-            "zeta_B": -rng.uniform(0.1, 1.2),
-            "zeta_H": -rng.uniform(0.1, 1.2),
-            "lambda_s": math.atan(rng.uniform(-3, 3)),
-        }
-
-
 def test_without_wheels_and_trail_it_is_tms_identically():
     """In fractions: both polynomials, for w = m_B = g = 1, are equal up to μ (χ_H − 1 − ζ_H T); 200 points of ten bits.
 
@@ -151,7 +136,7 @@ def test_no_wheel_is_no_division():
     assert float(value) == 0
     assert np.all(np.isfinite(np.array(slopes)))
     assert float(function(0.12, 0.3)[0]) == pytest.approx(0.4, rel=1e-15)
-    for p in skates(3):
+    for p in designs(3):
         a = whipple.coefficients({n: flint.arb(x) for n, x in ({**NONE, **to_si(p)}).items()})
         assert all(c.is_finite() for c in a)
 
@@ -518,50 +503,43 @@ def test_ep4_is_tuned_back_on_wheels(unfold):
 # The command
 
 
-def run(*arguments):
-    result = CliRunner().invoke(main, [*map(str, arguments)])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.output
-    return result
-
-
-def test_speeds_command():
-    said = run("speeds", "problems/whipple_benchmark.toml")
-    assert said.exit_code == 0
-    assert "stable: from 4.2923825 to 6.024262 m/s" in said.output
-    data = json.loads(run("speeds", "problems/whipple_benchmark.toml", "--json").output)
+def test_speeds_command(run):
+    benchmark = "problems/whipple_benchmark.toml"
+    code, out, _ = run("speeds", benchmark)
+    assert code == 0
+    assert "stable: from 4.2923825 to 6.024262 m/s" in out
+    data = json.loads(run("speeds", benchmark, "--json")[1])
     assert [c["kind"] for c in data["found"]] == ["EP2", "weave", "capsize"]
     assert data["stable"] == [[pytest.approx(4.29238253634111), pytest.approx(6.02426201538837)]]
-    assert (
-        run("speeds", "problems/whipple_benchmark.toml", "--parameter", "lambda_s", "--between", "0,1").exit_code == 2
-    )
-    assert run("speeds", "problems/chart.toml").exit_code == 2
+    assert run("speeds", benchmark, "--parameter", "lambda_s", "--between", "0,1")[0] == 2
+    assert run("speeds", "problems/chart.toml")[0] == 2
 
 
-def test_report_of_a_whipple_bicycle(tmp_path):
+def test_report_of_a_whipple_bicycle(tmp_path, run):
     path = tmp_path / "growth.png"
-    said = run("solve", "problems/whipple_benchmark.toml", "--full", "--plot", path)
-    assert said.exit_code == 0
+    code, out, _ = run("solve", "problems/whipple_benchmark.toml", "--full", "--plot", path)
+    assert code == 0
     for words in ("; stands on both wheels", "v_capsize         6.02426201539", "1/s", "I_Hxz"):
-        assert words in said.output
-    assert "dimensionless" not in said.output
+        assert words in out
+    assert "dimensionless" not in out
     assert path.stat().st_size > 10_000
 
 
-def test_import_command(tmp_path):
+def test_import_command(tmp_path, run):
     (tmp_path / "b.txt").write_text(FILE)
     out = tmp_path / "b.toml"
-    assert run("import", tmp_path / "b.txt", "--speed", "4.6", "-o", out).exit_code == 0
+    assert run("import", tmp_path / "b.txt", "--speed", "4.6", "-o", out)[0] == 0
     assert tmsopt.load(out).fixed == {**BENCHMARK, "v": 4.6}
-    assert run("import", tmp_path / "b.txt").output == problem_text(tmsopt.read_bicycle(tmp_path / "b.txt"))
+    assert run("import", tmp_path / "b.txt")[1] == problem_text(tmsopt.read_bicycle(tmp_path / "b.txt"))
     (tmp_path / "bad.txt").write_text("w = 1\n")
-    assert run("import", tmp_path / "bad.txt").exit_code == 2
+    assert run("import", tmp_path / "bad.txt")[0] == 2
 
 
-def test_compare_says_that_its_laws_are_of_skates():
-    said = run("compare", "problems/whipple_trail.toml")
-    assert said.exit_code == 0
-    assert "no laws are known of the Carvallo–Whipple bicycle" in said.output
-    assert "matching minus abscissa" in said.output
+def test_compare_says_that_its_laws_are_of_skates(run):
+    code, out, _ = run("compare", "problems/whipple_trail.toml")
+    assert code == 0
+    assert "no laws are known of the Carvallo–Whipple bicycle" in out
+    assert "matching minus abscissa" in out
 
 
 def test_proof_tells_unknowns_from_parameters_of_the_same_name():

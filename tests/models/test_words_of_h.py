@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.texts import faults
 
 import tmsopt
 from tmsopt.models import Unfit, from_hamiltonian
@@ -9,33 +10,23 @@ from tmsopt.models import Unfit, from_hamiltonian
 HEAD = '[model]\nH = [["d - 1j*g", "k"], ["k", "-1j*l"]]\n[parameters]\nd = 0\nl = 0.7\ng = { min = 0, max = 2 }\n'
 
 
-def refused(tmp_path, text):
-    path = tmp_path / "own.toml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(tmsopt.InputError) as found:
-        tmsopt.load(path)
-    return str(found.value)
-
-
 @pytest.mark.parametrize("k", ['"0.5+0.2j"', "0.5j", '"0.5j"', "0.5+0.2j"])
 def test_parameters_are_real(tmp_path, k):
-    said = refused(tmp_path, f"{HEAD}k = {k}\n[objective]\nlocate = 'EP2'\n")
-    assert "own.toml:7" in said
+    (said,) = faults(tmp_path, f"{HEAD}k = {k}\n[objective]\nlocate = 'EP2'\n")
+    assert said.startswith("7:")
     assert "parameters are real" in said
     assert "kr + 1j*ki" in said
     assert "with a unit" not in said
 
 
 def test_a_threshold_is_weave_in_data(tmp_path):
-    assert "'threshold' is weave in data; write weave" in refused(
-        tmp_path, f"{HEAD}k = 0.5\n[objective]\nlocate = 'threshold'\n"
-    )
+    (said,) = faults(tmp_path, f"{HEAD}k = 0.5\n[objective]\nlocate = 'threshold'\n")
+    assert "'threshold' is weave in data; write weave" in said
 
 
 def test_a_bare_j_is_told_where_it_is_alone(tmp_path):
-    said = refused(tmp_path, '[model]\nH = [["1j*g", "k"], ["j*k", "-1j"]]\n[parameters]\ng = 1\nk = 1\n')
-    assert said.count("would be a parameter") == 1
-    assert "row 2, column 1: 'j' would be a parameter" in said
+    said = faults(tmp_path, '[model]\nH = [["1j*g", "k"], ["j*k", "-1j"]]\n[parameters]\ng = 1\nk = 1\n')
+    assert ["row 2, column 1: 'j' would be a parameter" in text for text in said if "would be" in text] == [True]
 
 
 def test_numbers_alone_make_no_model():
@@ -61,7 +52,7 @@ def test_a_proof_speaks_of_eigenfrequencies(g, holds, words):
 
 def test_coefficients_of_the_real_system_are_no_names_of_h(tmp_path):
     """Their carrier is chosen for the ranges of a problem, so that a limit on them would say nothing of H."""
-    said = refused(tmp_path, f'{HEAD}k = 0.5\n[objective]\nlocate = "EP2"\n[constraints]\nc = "a1 <= 2"\n')
+    (said,) = faults(tmp_path, f'{HEAD}k = 0.5\n[objective]\nlocate = "EP2"\n[constraints]\nc = "a1 <= 2"\n')
     assert "a1" in said
     assert "a2" not in said
     problem = tmsopt.Problem(from_hamiltonian([["d - 1j*g", 1], [1, "-1j"]]), fixed={"d": 0.0, "g": 1.0})

@@ -9,6 +9,7 @@ from math import radians
 import numpy as np
 import pytest
 from helpers import hunt
+from helpers.texts import load
 
 import tmsopt
 from tmsopt import laws
@@ -32,16 +33,6 @@ minimize = "abscissa"
 """
 
 
-@pytest.fixture
-def written(tmp_path):
-    def load(text, before=FILE):
-        path = tmp_path / "problem.toml"
-        path.write_text(before + text, encoding="utf-8")
-        return tmsopt.load(path)
-
-    return load
-
-
 def problem(fixed=FIXED, free=BOX, **asked):
     return tmsopt.Problem(TMS, fixed=fixed, free=free, **{"minimize": "abscissa", **asked})
 
@@ -54,9 +45,10 @@ def spread(d):
 # What is written
 
 
-def test_file_and_python_are_one_problem(written):
-    loaded = written(
-        '[scenarios]\nFr = { min = 1.2, max = 2.4, points = 3 }\n[tolerances]\nzeta_H = "5 mm"\nchi_B = 0.01\n'
+def test_file_and_python_are_one_problem(tmp_path):
+    loaded = load(
+        tmp_path,
+        FILE + '[scenarios]\nFr = { min = 1.2, max = 2.4, points = 3 }\n[tolerances]\nzeta_H = "5 mm"\nchi_B = 0.01\n',
     )
     stated = problem(
         scenarios={"Fr": {"min": 1.2, "max": 2.4, "points": 3}}, tolerances={"zeta_H": 0.005, "chi_B": 0.01}
@@ -69,9 +61,11 @@ def test_file_and_python_are_one_problem(written):
     assert problem({**FIXED, "Fr": 2.2}, scenarios={"Fr": [1.2, 2.4]}).fixed["Fr"] == 2.2
 
 
-def test_units_of_scenarios_tolerances_and_weights(written):
-    dimensionless = written(
-        '[scenarios]\nFr = [2]\n[tolerances]\nzeta_H = "5 mm"\nlambda_s = "1 deg"\nmu = "20 g"\n[weights]\nchi_B = "1 cm"\n'
+def test_units_of_scenarios_tolerances_and_weights(tmp_path):
+    dimensionless = load(
+        tmp_path,
+        FILE
+        + '[scenarios]\nFr = [2]\n[tolerances]\nzeta_H = "5 mm"\nlambda_s = "1 deg"\nmu = "20 g"\n[weights]\nchi_B = "1 cm"\n',
     )
     assert dimensionless.tolerances == pytest.approx(
         {"zeta_H": 0.005, "lambda_s": radians(1), "mu": 0.02}
@@ -94,40 +88,47 @@ m_H = ["500 g", 2]
 [tolerances]
 z_H = "5 mm"
 """
-    built = written(si, "")
+    built = load(tmp_path, si)
     assert built.scenarios == {"v": Band(2.5, 5.0, 2), "m_H": (0.5, 2)}
     assert built.tolerances == pytest.approx({"z_H": 0.005})
     assert len(built.posed.cases) == 2 * 2 * 2
 
 
-FAULTS = [
-    # section, what is written, its key, what the message must name
-    ("scenarios", "Fr = { min = 2.4, max = 1.2 }", "Fr", ["min = 2.4", "less than max = 1.2"]),
-    ("scenarios", "Fr = { min = 1.2, max = 2.4, points = 1 }", "Fr.points", ["points = 1", "2 to 99"]),
-    ("scenarios", "Fr = { min = 1.2, max = 2.4, steps = 3 }", "Fr.steps", ["'steps'", "min max points"]),
-    ("scenarios", "Fr = { min = 1.2 }", "Fr.max", ["missing max", "points = 7"]),
-    ("scenarios", "Fr = 1.2", "Fr", ["1.2", "[1, 2.5]"]),
-    ("scenarios", "Fr = []", "Fr", ["accepted", "list of values"]),
-    ("scenarios", "Fr = [1, -2]", "Fr", ["Fr = -2", ">= 0"]),
-    ("scenarios", 'Fr = [1, "2 deg"]', "Fr", ["'2 deg'", "a number"]),
-    ("scenarios", "chi_B = [1.2]", "chi_B", ["both free and in scenarios", "keep one"]),
-    ("scenarios", "speed = [1, 2]", "speed", ["'speed'", "Fr mu chi_B"]),
-    ("tolerances", "zeta_H = -0.1", "zeta_H", ["-0.1", "greater than 0"]),
-    ("tolerances", "zeta_H = 0.3", "zeta_H", ["reaches 0.1", "<= 0", "by the tolerance"]),
-    ("tolerances", 'lambda_s = "30 deg"', "lambda_s", ["reaches 1.7236", "1.5708"]),  # 1.2 rad and 30 degrees
-    ("tolerances", 'zeta_H = "5 deg"', "zeta_H", ["'deg'", "unit of m"]),
-    ("tolerances", "lambda_s = true", "lambda_s", ["True", "'5 mm'"]),
-    ("tolerances", 'Fr = "5 mm"', "Fr", ["'5 mm'", "dimensionless"]),
-    ("weights", "zeta_H = -0.1", "zeta_H", ["-0.1", "0 or greater"]),
-    ("weights", "x = 1", "x", ["'x'", "Fr mu chi_B"]),
-]
+FAULTS = {
+    "scenarios": {
+        "Fr = { min = 2.4, max = 1.2 }": ("Fr", ["min = 2.4", "max = 1.2"]),
+        "Fr = { min = 1.2, max = 2.4, points = 1 }": ("Fr.points", ["points = 1", "2 to 99"]),
+        "Fr = { min = 1.2, max = 2.4, steps = 3 }": ("Fr.steps", ["'steps'", "min max points"]),
+        "Fr = { min = 1.2 }": ("Fr.max", ["missing max", "points = 7"]),
+        "Fr = 1.2": ("Fr", ["1.2", "[1, 2.5]"]),
+        "Fr = []": ("Fr", ["accepted", "list of values"]),
+        "Fr = [1, -2]": ("Fr", ["Fr = -2", ">= 0"]),
+        'Fr = [1, "2 deg"]': ("Fr", ["'2 deg'", "a number"]),
+        "chi_B = [1.2]": ("chi_B", ["both free and in scenarios", "keep one"]),
+        "speed = [1, 2]": ("speed", ["'speed'", "Fr mu chi_B"]),
+    },
+    "tolerances": {
+        "zeta_H = -0.1": ("zeta_H", ["-0.1", "greater than 0"]),
+        "zeta_H = 0.3": ("zeta_H", ["reaches 0.1", "<= 0", "by the tolerance"]),
+        'lambda_s = "30 deg"': ("lambda_s", ["reaches 1.7236", "1.5708"]),  # 1.2 rad and 30 degrees
+        'zeta_H = "5 deg"': ("zeta_H", ["'deg'", "unit of m"]),
+        "lambda_s = true": ("lambda_s", ["True", "'5 mm'"]),
+        'Fr = "5 mm"': ("Fr", ["'5 mm'", "dimensionless"]),
+    },
+    "weights": {
+        "zeta_H = -0.1": ("zeta_H", ["-0.1", "0 or greater"]),
+        "x = 1": ("x", ["'x'", "Fr mu chi_B"]),
+    },
+}
+"""Section → what is written → its key, and what the message must name."""
 
 
-@pytest.mark.parametrize(("section", "line", "key", "named"), FAULTS)
-def test_faults_name_their_place_value_and_what_is_accepted(written, section, line, key, named):
+@pytest.mark.parametrize(("section", "line"), [(section, line) for section, lines in FAULTS.items() for line in lines])
+def test_faults_name_their_place_value_and_what_is_accepted(tmp_path, section, line):
+    key, named = FAULTS[section][line]
     filled = FILE.replace("mu = 0.1\n", "mu = 0.1\nFr = 2.0\n") if section != "scenarios" or "Fr" not in line else FILE
     with pytest.raises(tmsopt.InputError) as error:
-        written(f"[{section}]\n{line}\n", filled)
+        load(tmp_path, f"{filled}[{section}]\n{line}\n")
     found = [f for f in error.value.faults if ".".join(f.key) == f"{section}.{key}"]
     assert len(found) == 1
     assert found[0].line == filled.count("\n") + 2

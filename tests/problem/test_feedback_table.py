@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.bicycles import BENCHMARK, appendix
+from helpers.bicycles import BENCHMARK, abscissa as abscissa_of
+from helpers.texts import faults, load
 
 import tmsopt
 from tmsopt.documents import convert_to_si
@@ -61,20 +62,6 @@ PHI = "k_phi = { min = -100, max = 100 }"
 OBJECTIVE = "[objective]"
 
 
-def fault(tmp_path, text):
-    file = tmp_path / "robot.toml"
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(tmsopt.InputError) as caught:
-        tmsopt.load(file)
-    return str(caught.value).removeprefix(f"{file}:").split(f"\n{file}:")
-
-
-def read(tmp_path, text):
-    file = tmp_path / "robot.toml"
-    file.write_text(text, encoding="utf-8")
-    return tmsopt.load(file)
-
-
 def line(text, found):
     return next(k for k, written in enumerate(text.splitlines(), 1) if written.startswith(found))
 
@@ -84,19 +71,19 @@ def line(text, found):
 
 @pytest.mark.parametrize(
     ("written", "value"),
-    [
-        ('k_phi = "20 N m/rad"', 20.0),
-        ('k_phi = "20 N*m/rad"', 20.0),
-        ('k_phi = "1 N m/deg"', 180 / math.pi),
-        ('k_phidot_v = "2 N s^2/rad"', 2.0),
-        ('lean_phidot = "3 N m s/rad"', 3.0),
-        ('lag = "0.05 s"', 0.05),
-        ('lag = "50 ms"', 0.05),
-        ("lag = 0.05", 0.05),
-    ],
+    {
+        'k_phi = "20 N m/rad"': 20.0,
+        'k_phi = "20 N*m/rad"': 20.0,
+        'k_phi = "1 N m/deg"': 180 / math.pi,
+        'k_phidot_v = "2 N s^2/rad"': 2.0,
+        'lean_phidot = "3 N m s/rad"': 3.0,
+        'lag = "0.05 s"': 0.05,
+        'lag = "50 ms"': 0.05,
+        "lag = 0.05": 0.05,
+    }.items(),
 )
 def test_numbers_with_units(written, value, tmp_path):
-    problem = read(tmp_path, WHEELS.replace(PHI, written))
+    problem = load(tmp_path, WHEELS.replace(PHI, written))
     assert problem.fixed[written.split(maxsplit=1)[0]] == pytest.approx(value, rel=1e-15)
 
 
@@ -104,8 +91,8 @@ def test_gains_stand_in_either_table_and_in_python(tmp_path):
     """One problem in three ways; what is left out of the steer torque is 0."""
     head, rest = WHEELS.split("[feedback]")
     gains = "".join(f"k_{x} = {{ min = -100, max = 100 }}\n" for x in ("phi", "phidot"))
-    one = read(tmp_path, f"{head}[feedback]\n{gains}[objective]\n" + rest.split("[objective]")[1])
-    other = read(tmp_path, f"{head}{gains}[objective]\n" + rest.split("[objective]")[1])
+    one = load(tmp_path, f"{head}[feedback]\n{gains}[objective]\n" + rest.split("[objective]")[1])
+    other = load(tmp_path, f"{head}{gains}[objective]\n" + rest.split("[objective]")[1])
     fixed = {n: v for n, v in one.fixed.items() if not n.startswith("k_")}
     model, free = tmsopt.models.whipple, dict.fromkeys(("k_phi", "k_phidot"), (-100.0, 100.0))
     made = tmsopt.Problem(model, fixed, free, minimize="abscissa", title=one.title, units=one.units)
@@ -116,36 +103,37 @@ def test_gains_stand_in_either_table_and_in_python(tmp_path):
 
 def test_an_empty_table_is_no_controller(tmp_path):
     head = WHEELS.split("[feedback]")[0]
-    problem = read(tmp_path, f'{head}[feedback]\n[objective]\nminimize = "abscissa"\n')
+    problem = load(tmp_path, f'{head}[feedback]\n[objective]\nminimize = "abscissa"\n')
     assert problem.model is tmsopt.models.whipple
 
 
 # What is wrong
 
 
+GAINS = {
+    "k_fi = 3": ": unknown gain 'k_fi'; did you mean 'k_phi'?",
+    "kappa_phi = 3": ": unknown gain 'kappa_phi'",
+    "k_phi = { min = 9, max = 1 }": ": min = 9 is greater than max = 1",
+    "k_phi = nan": ": found nan; accepted: a finite number in N m/rad",
+    "k_phi = { min = -inf, max = 1 }": ".min: found -inf",
+    'k_phi = "20 N m"': ": found the unit 'N m', which is not known or not",
+    "k_phi = true": ": found True; accepted: a number",
+    "k_phi = { min = 1 }": ".max: missing max of k_phi",
+    "k_phi = { min = 1, max = 2, start = 5 }": ".start: start = 5 lies",
+    "lag = 0": ": lag = 0 s is not physical",
+    'lag = "5 kg"': ": found the unit 'kg', which is not known or not a unit of s",
+}
+"""A line instead of that of k_phi, and its fault."""
+
+
 @pytest.mark.parametrize(
     ("text", "old", "new", "at", "said"),
     [
-        (WHEELS, PHI, "k_fi = 3", "k_fi", "feedback.k_fi: unknown gain 'k_fi'; did you mean 'k_phi'?"),
-        (WHEELS, PHI, "kappa_phi = 3", "kappa_phi", "feedback.kappa_phi: unknown gain 'kappa_phi'"),
+        *((WHEELS, PHI, new, name := new.split()[0], f"feedback.{name}{said}") for new, said in GAINS.items()),
         (WHEELS, "v = 1.7", "v = 1.7\nk_phi = 3", "k_phi = {", "feedback.k_phi: 'k_phi' is in [parameters] too"),
-        (WHEELS, PHI, "k_phi = { min = 9, max = 1 }", "k_phi", "feedback.k_phi: min = 9 is greater than max = 1"),
-        (WHEELS, PHI, "k_phi = nan", "k_phi", "feedback.k_phi: found nan; accepted: a finite number in N m/rad"),
-        (WHEELS, PHI, "k_phi = { min = -inf, max = 1 }", "k_phi", "feedback.k_phi.min: found -inf"),
-        (WHEELS, PHI, 'k_phi = "20 N m"', "k_phi", "feedback.k_phi: found the unit 'N m', which is not known or not"),
-        (WHEELS, PHI, "k_phi = true", "k_phi", "feedback.k_phi: found True; accepted: a number"),
-        (WHEELS, PHI, "k_phi = { min = 1 }", "k_phi", "feedback.k_phi.max: missing max of k_phi"),
-        (WHEELS, PHI, "k_phi = { min = 1, max = 2, start = 5 }", "k_phi", "feedback.k_phi.start: start = 5 lies"),
-        (WHEELS, PHI, "lag = 0", "lag", "feedback.lag: lag = 0 s is not physical"),
-        (
-            WHEELS,
-            PHI,
-            'lag = "5 kg"',
-            "lag",
-            "feedback.lag: found the unit 'kg', which is not known or not a unit of s",
-        ),
         (WHEELS, "[feedback]", "[feedbck]", "[feedbck]", "feedbck: unknown key 'feedbck'; did you mean 'feedback'?"),
         (WHEELS, '"whipple"', '"wipple"', "model", "model: unknown model 'wipple'; did you mean 'whipple'?"),
+        (WHEELS, '"abscissa"', '"v_weave"', "minimize", "objective.minimize: 'v_weave' uses the unknown name"),
         (
             SKATES,
             "k_phi =",
@@ -155,19 +143,12 @@ def test_an_empty_table_is_no_controller(tmp_path):
         ),
         (PLAIN, "kappa_phi =", "k_phi =", "k_phi", "feedback.k_phi: SI parameter 'k_phi' among dimensionless ones"),
         (OWN, "k_phi", "k_phi", "[feedback]", "feedback: is for the bicycles tms and whipple"),
-        (
-            WHEELS,
-            '"abscissa"',
-            '"v_weave"',
-            "minimize",
-            "objective.minimize: 'v_weave' uses the unknown name 'v_weave'",
-        ),
     ],
 )
 def test_one_fault_at_its_line(text, old, new, at, said, tmp_path):
     assert old in text
     wrong = text.replace(old, new, 1)
-    (found,) = fault(tmp_path, wrong)
+    (found,) = faults(tmp_path, wrong)
     number, _, message = found.partition(": ")
     assert int(number) == line(wrong, at)
     assert message.startswith(said)
@@ -177,7 +158,7 @@ def test_one_fault_at_its_line(text, old, new, at, said, tmp_path):
 def test_what_is_no_table(written, tmp_path):
     head, rest = WHEELS.split("[feedback]")
     text = f"{head}[objective]{rest.split(OBJECTIVE)[1]}".replace("[parameters]", f"feedback = {written}\n[parameters]")
-    (found,) = fault(tmp_path, text)
+    (found,) = faults(tmp_path, text)
     assert found.startswith(f"{line(text, 'feedback')}: feedback: found ")
     assert found.endswith("accepted: a table of gains, such as k_phidot = -20")
 
@@ -198,21 +179,10 @@ def test_faults_of_a_study_are_in_its_own_table(tmp_path):
 # The problems of the gallery
 
 
-def eigenvalues(v, k):
-    """Of the benchmark bicycle by the appendix, with the gains in the row of the steer torque."""
-    M, C1, K0, K2 = (
-        np.array(m, dtype=float) for m in appendix(BENCHMARK, math.sin(math.pi / 10), math.cos(math.pi / 10))
-    )
-    D, K = v * C1, 9.81 * K0 + v * v * K2
-    gains = {n: k.get(f"k_{n}", 0.0) + k.get(f"k_{n}_v", 0.0) * v for n in ("phi", "delta", "phidot", "deltadot")}
-    K[1] += [gains["phi"], gains["delta"]]
-    D[1] += [gains["phidot"], gains["deltadot"]]
-    inverse = np.linalg.inv(M)
-    return np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ D]]))
-
-
 def abscissa(v, k):
-    return float(eigenvalues(v, k).real.max())
+    """Of the benchmark bicycle by the appendix, with the gains in the row of the steer torque."""
+    gains = [k.get(f"k_{n}", 0.0) + k.get(f"k_{n}_v", 0.0) * v for n in ("phi", "phidot", "delta", "deltadot")]
+    return float(abscissa_of(BENCHMARK, v, gains))
 
 
 def test_the_schedule_is_stable_at_every_speed_and_its_torque_the_least():
@@ -259,7 +229,7 @@ def test_balance_assist_is_certified_and_proved():
 def problems(tmp_path):
     lagged = WHEELS.replace(OBJECTIVE, 'lag = "50 ms"\n[objective]')
     return {
-        n: read(tmp_path, t) for n, t in (("wheels", WHEELS), ("skates", SKATES), ("plain", PLAIN), ("lag", lagged))
+        n: load(tmp_path, t) for n, t in (("wheels", WHEELS), ("skates", SKATES), ("plain", PLAIN), ("lag", lagged))
     }
 
 
@@ -284,7 +254,7 @@ def test_results_are_written_for_every_kind(kind, tmp_path):
     assert [known["name"] for known in data["designs"]] == ["optimum", "benchmark"]
     values = dict(zip(problem.posed.parameter_set.names, data["designs"][0]["values"], strict=True))
     lines = "".join(f"{name} = {value!r}\n" for name, value in values.items())
-    again = tmsopt.solve(read(tmp_path, data["toml"]["before"] + lines + data["toml"]["after"]))
+    again = tmsopt.solve(load(tmp_path, data["toml"]["before"] + lines + data["toml"]["after"]))
     assert again.abscissa_realised == design.abscissa_realised
     benchmark = dict(zip(problem.posed.parameter_set.names, data["designs"][1]["values"], strict=True))
     assert {benchmark[n] for n in problem.free} == {0.0}  # without a controller

@@ -78,51 +78,47 @@ maximize = "v - v_c"
     assert problem.posed.parameter_set.name == "SI"
 
 
-def replaced(old, new):
-    assert old in GOOD
-    return GOOD.replace(old, new)
-
-
-# text of the file, line at fault, words that the message must contain
+# part of the good file, what is written instead, line at fault, words that the message must contain
 BAD = {
-    "unknown section": ("[paramters]\nx = 1\n" + GOOD, 1, ["paramters", "did you mean 'parameters'"]),
-    "unknown key of a parameter": (replaced("start = 2", "strat = 2"), 10, ["strat", "did you mean 'start'"]),
-    "misspelt parameter": (replaced("chi_H = 1.0", "chi_h = 1.0"), 5, ["chi_h", "did you mean 'chi_H'"]),
-    "missing parameter": (replaced("mu = 0.1\n", ""), 4, ["missing parameter mu"]),
-    "min above max": (replaced("min = 1.01", "min = 7"), 9, ["7", "5", "swap"]),
-    "missing max": (replaced("{ min = 1.01, max = 5 }", "{ min = 1.01 }"), 9, ["missing max"]),
-    "start outside": (replaced("start = 2", "start = 20"), 10, ["start", "20", "0.01", "10"]),
-    "wrong unit": (replaced('"1 deg"', '"1 kg"'), 11, ["kg", "deg"]),
-    "unit on a dimensionless number": (replaced("mu = 0.1", 'mu = "0.1 kg"'), 8, ["0.1 kg", "dimensionless"]),
-    "malformed unit": (replaced('"1 deg"', '"1 d*/g"'), 11, ["d*/g"]),
-    "not physical": (replaced("zeta_B = -0.4", "zeta_B = 0.4"), 7, ["zeta_B", "0.4", "<= 0"]),
-    "tilt beyond 90 degrees": (replaced('"80 deg"', '"95 deg"'), 11, ["lambda_s", "1.5708"]),
-    "nan": (replaced("mu = 0.1", "mu = nan"), 8, ["nan", "finite"]),
-    "infinity": (replaced("max = 5", "max = inf"), 9, ["inf", "finite"]),
-    "boolean": (replaced("mu = 0.1", "mu = true"), 8, ["True", "number"]),
-    "list": (replaced("mu = 0.1", "mu = [1]"), 8, ["[1]", "number"]),
-    "mixed sets": (replaced("mu = 0.1", "mu = 0.1\nm_B = 10"), 9, ["m_B", "SI", "do not mix"]),
-    "both objectives": (replaced('"abscissa"', '"abscissa"\nmaximize = "Fr"'), 13, ["minimize and maximize"]),
-    "no objective": (replaced('minimize = "abscissa"\n', ""), 13, ["minimize, maximize or locate"]),
-    "unknown pattern": (replaced('minimize = "abscissa"', 'locate = "EP5"'), 14, ["EP5", "EP4"]),
-    "objective does not parse": (replaced('"abscissa"', '"abscissa +"'), 14, ["abscissa +", "does not parse"]),
-    "unknown name": (replaced("nu_H >=", "nuh >="), 17, ["nuh", "did you mean 'nu_H'"]),
-    "call": (replaced("nu_H >= 0.02", "__import__('os') >= 0"), 17, ["__import__"]),
-    "attribute": (replaced("nu_H >= 0.02", "nu_H.real >= 0"), 17, ["attribute"]),
-    "not a comparison": (replaced("nu_H >= 0.02", "nu_H"), 17, ["not a comparison", ">="]),
-    "constraint is a number": (replaced('"nu_H >= 0.02"', "3"), 17, ["3", "quotes"]),
-    "title is a number": (replaced('"EP4 of the chi_H = 1 bicycle"', "4"), 1, ["title", "4"]),
-    "parameters is a number": ("parameters = 3\n", 1, ["parameters", "3"]),
-    "no parameters": ('title = "x"\n', 1, ["parameters", "missing"]),
-    "not TOML": (replaced("mu = 0.1", "mu = = 0.1"), 8, ["not TOML"]),
-    "duplicate key": (replaced("mu = 0.1", "mu = 0.1\nmu = 0.2"), 9, ["not TOML"]),
+    "unknown section": (GOOD, "[paramters]\nx = 1\n" + GOOD, 1, ["paramters", "did you mean 'parameters'"]),
+    "unknown key of a parameter": ("start = 2", "strat = 2", 10, ["strat", "did you mean 'start'"]),
+    "misspelt parameter": ("chi_H = 1.0", "chi_h = 1.0", 5, ["chi_h", "did you mean 'chi_H'"]),
+    "missing parameter": ("mu = 0.1\n", "", 4, ["missing parameter mu"]),
+    "min above max": ("min = 1.01", "min = 7", 9, ["7", "5", "swap"]),
+    "missing max": ("{ min = 1.01, max = 5 }", "{ min = 1.01 }", 9, ["missing max"]),
+    "start outside": ("start = 2", "start = 20", 10, ["start", "20", "0.01", "10"]),
+    "wrong unit": ('"1 deg"', '"1 kg"', 11, ["kg", "deg"]),
+    "unit on a dimensionless number": ("mu = 0.1", 'mu = "0.1 kg"', 8, ["0.1 kg", "dimensionless"]),
+    "malformed unit": ('"1 deg"', '"1 d*/g"', 11, ["d*/g"]),
+    "not physical": ("zeta_B = -0.4", "zeta_B = 0.4", 7, ["zeta_B", "0.4", "<= 0"]),
+    "tilt beyond 90 degrees": ('"80 deg"', '"95 deg"', 11, ["lambda_s", "1.5708"]),
+    "nan": ("mu = 0.1", "mu = nan", 8, ["nan", "finite"]),
+    "infinity": ("max = 5", "max = inf", 9, ["inf", "finite"]),
+    "boolean": ("mu = 0.1", "mu = true", 8, ["True", "number"]),
+    "list": ("mu = 0.1", "mu = [1]", 8, ["[1]", "number"]),
+    "mixed sets": ("mu = 0.1", "mu = 0.1\nm_B = 10", 9, ["m_B", "SI", "do not mix"]),
+    "both objectives": ('"abscissa"', '"abscissa"\nmaximize = "Fr"', 13, ["minimize and maximize"]),
+    "no objective": ('minimize = "abscissa"\n', "", 13, ["minimize, maximize or locate"]),
+    "unknown pattern": ('minimize = "abscissa"', 'locate = "EP5"', 14, ["EP5", "EP4"]),
+    "objective does not parse": ('"abscissa"', '"abscissa +"', 14, ["abscissa +", "does not parse"]),
+    "unknown name": ("nu_H >=", "nuh >=", 17, ["nuh", "did you mean 'nu_H'"]),
+    "call": ("nu_H >= 0.02", "__import__('os') >= 0", 17, ["__import__"]),
+    "attribute": ("nu_H >= 0.02", "nu_H.real >= 0", 17, ["attribute"]),
+    "not a comparison": ("nu_H >= 0.02", "nu_H", 17, ["not a comparison", ">="]),
+    "constraint is a number": ('"nu_H >= 0.02"', "3", 17, ["3", "quotes"]),
+    "title is a number": ('"EP4 of the chi_H = 1 bicycle"', "4", 1, ["title", "4"]),
+    "parameters is a number": (GOOD, "parameters = 3\n", 1, ["parameters", "3"]),
+    "no parameters": (GOOD, 'title = "x"\n', 1, ["parameters", "missing"]),
+    "not TOML": ("mu = 0.1", "mu = = 0.1", 8, ["not TOML"]),
+    "duplicate key": ("mu = 0.1", "mu = 0.1\nmu = 0.2", 9, ["not TOML"]),
 }
 
 
 @pytest.mark.parametrize("kind", BAD)
 def test_bad_input_is_placed_and_explained(write, kind):
-    text, line, words = BAD[kind]
-    path = write(text)
+    old, new, line, words = BAD[kind]
+    assert old in GOOD
+    path = write(GOOD.replace(old, new))
     with pytest.raises(tmsopt.InputError) as caught:
         as_solvable(path)
     at_line = [f for f in caught.value.faults if f.line == line]
@@ -146,26 +142,20 @@ def test_same_faults_from_python():
         tmsopt.Problem(tmsopt.models.tms, free={"Fr": (2, 1)}, minimize="abscissa")
 
 
-def unreadable(tmp_path, name):
-    path = tmp_path / "x.toml"
-    if name == "directory":
-        return tmp_path
-    if name == "missing":
-        return path
-    contents = {
-        "huge": b"# " + b"x" * (10 * LARGEST),
-        "not text": b'title = "\xff\xfe"\n',
-        "nul": b"title = \x00\n",
-        "empty": b"",
-        "nested": b"x = " + b"[" * 5000,
-    }
-    path.write_bytes(contents[name])
-    return path
+UNREADABLE = {
+    "huge": b"# " + b"x" * (10 * LARGEST),
+    "not text": b'title = "\xff\xfe"\n',
+    "nul": b"title = \x00\n",
+    "empty": b"",
+    "nested": b"x = " + b"[" * 5000,
+}
 
 
-@pytest.mark.parametrize("name", ["directory", "missing", "huge", "not text", "nul", "empty", "nested"])
+@pytest.mark.parametrize("name", ["directory", "missing", *UNREADABLE])
 def test_files_that_cannot_be_problems(tmp_path, name):
-    path = unreadable(tmp_path, name)
+    path = tmp_path if name == "directory" else tmp_path / "x.toml"
+    if name in UNREADABLE:
+        path.write_bytes(UNREADABLE[name])
     with pytest.raises(tmsopt.InputError) as caught:
         tmsopt.load(path)
     assert str(path) in str(caught.value)
@@ -178,7 +168,7 @@ def test_missing_file_suggests_a_neighbour(write):
 
 
 def test_minimum_equal_to_maximum_fixes(write):
-    problem = tmsopt.load(write(replaced("max = 5", "max = 1.01")))
+    problem = tmsopt.load(write(GOOD.replace("max = 5", "max = 1.01")))
     assert problem.fixed["chi_B"] == 1.01
     assert "chi_B" not in problem.free
 

@@ -55,7 +55,7 @@ def test_a_file_larger_than_files_need_is_refused_at_its_line(tmp_path, kind):
 
 
 @pytest.mark.parametrize(
-    ("entry", "line"), [("b{} = 1", "unknown parameter 'b0'"), ("b{} = []", "found []"), ("b{0} = {{x = 1}}", "b0")]
+    ("entry", "line"), {"b{} = 1": "unknown parameter 'b0'", "b{} = []": "found []", "b{0} = {{x = 1}}": "b0"}.items()
 )
 def test_the_first_faults_are_listed_and_the_rest_is_counted(tmp_path, entry, line):
     text = GOOD + "".join(entry.format(k) + "\n" for k in range(10_000))

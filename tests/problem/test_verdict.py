@@ -2,6 +2,7 @@
 
 import flint
 import pytest
+from helpers.texts import faults
 
 import tmsopt
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
@@ -107,7 +108,7 @@ def test_growth_is_hedged_unless_fractions_show_it(model, at, growth, exact):
     assert all(("up to rounding errors" in line) is not exact for line in moved)
 
 
-@pytest.mark.parametrize(("k", "exact"), [("1/4", True), ("1/4 + 1e-13", False), ("sqrt(2)/4*sqrt(2)/2", False)])
+@pytest.mark.parametrize(("k", "exact"), {"1/4": True, "1/4 + 1e-13": False, "sqrt(2)/4*sqrt(2)/2": False}.items())
 def test_roots_meet_as_far_as_rounding_tells(k, exact):
     """s² + s + k is a square at k = 1/4."""
     found = tmsopt.solve(tmsopt.Problem(from_coefficients([1, 1, "k"]), fixed={"k": k}))
@@ -177,6 +178,5 @@ def test_no_design_on_the_edge_is_said_to_be_the_least_unstable():
 
 def test_a_share_of_a_value_is_written_as_its_amount(tmp_path):
     """5 % of a mass of 5 kg is 0.25 kg; 0.05 would be 0.05 kg."""
-    (tmp_path / "a.toml").write_text('model = "tms"\n[tolerances]\nm_B = "5 %"\n[parameters]\nm_B = "5 kg"\n')
-    with pytest.raises(tmsopt.InputError, match="5 % of a value as its amount"):
-        tmsopt.load(tmp_path / "a.toml")
+    found = faults(tmp_path, 'model = "tms"\n[tolerances]\nm_B = "5 %"\n[parameters]\nm_B = "5 kg"\n')
+    assert any("5 % of a value as its amount" in fault for fault in found)

@@ -13,10 +13,6 @@ _UNITS = _WORDS["units"]
 Repair = tuple[str, str | Callable[[re.Match[str]], str]]
 
 
-def _convert_unit(found: re.Match[str]) -> str:
-    return f"{float(found[1]) * _UNITS[found[2]]:.12g}"
-
-
 _REPAIRS: tuple[Repair, ...] = (
     *((re.escape(sign), replacement) for sign, replacement in _WORDS["signs"].items()),
     (r"(?<![<>=!])=(?!=)", "=="),
@@ -25,7 +21,7 @@ _REPAIRS: tuple[Repair, ...] = (
     (_NUMBER + r"\s*%", lambda found: f"{float(found[1]) / 100:.12g}"),
     (_NUMBER + r"\s*(?:°|deg\b|degrees?\b)", r"\1*pi/180"),
     (_NUMBER + r"\s*rad\b", r"\1"),
-    (_NUMBER + rf"\s*({'|'.join(_UNITS)})\b(?!\s*/)", _convert_unit),
+    (_NUMBER + rf"\s*({'|'.join(_UNITS)})\b(?!\s*/)", lambda found: f"{float(found[1]) * _UNITS[found[2]]:.12g}"),
     (_NUMBER + r"\s*(?=(?!j\b)[A-Za-z(])", r"\1*"),
 )
 """Pattern of a foreign notation → its replacement, applied in this order."""

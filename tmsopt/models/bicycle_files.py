@@ -7,14 +7,14 @@ comment. YAML files have the numbers under ``values:``, or at the top level. The
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
 
 from tmsopt.errors import Fault, InputError, escape_unprintable, limit_advice, short, suggest
 from tmsopt.files import as_path, read_text, write_text
 from tmsopt.models.bicycles.whipple import whipple
-from tmsopt.records import Table
+from tmsopt.records import Numbers, Table
 
 _SI = whipple.sets[0]
 _FILE_NAMES = {p.name: "lam" if p.name == "lambda_s" else p.name.replace("_", "") for p in _SI.parameters}
@@ -31,6 +31,7 @@ _IGNORED = (
 )
 """Names in some files that add nothing about the linear motion."""
 
+_OTHERS = (*_NO_PART, *_IGNORED)
 _OPTIONAL = ("v", "g")
 _YAML = (".yml", ".yaml")
 _TEXT = (".txt", ".ini")
@@ -99,30 +100,28 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
         if kind == "YAML" and name == "parameterization":
             if written.strip("'\" ").lower() not in _KINDS:
                 message = f"found the parameterization {short(written)}; accepted: Meijaard2007 or benchmark"
-        elif name not in _MODEL_NAMES and name not in _NO_PART + _IGNORED:
+        elif name not in _MODEL_NAMES and name not in _OTHERS:
             message = f"unknown name {short(name)}; {advice(name, [*_MODEL_NAMES, *_NO_PART])}"
         elif numbers is None:
-            accepted = "a number, with +/- its uncertainty, or several between commas"
-            message = f"{name}: found {short(written)}; accepted: {accepted}"
-        elif name in _NO_PART + _IGNORED:
+            message = (
+                f"{name}: found {short(written)}; "
+                "accepted: a number, with +/- its uncertainty, or several between commas"
+            )
+        elif name in _OTHERS:
             others[name] = numbers[0]
         else:
             found[_MODEL_NAMES[name]], deviations[_MODEL_NAMES[name]] = numbers
         if message:
             faults.append(Fault(message).at(str(path), number))
     reported = {name for _, name, _ in entries}
-    missing = [w for n, w in _FILE_NAMES.items() if w not in reported and n not in _OPTIONAL]
-    if missing:
-        raw = (
-            " These are raw measurements; make the Benchmark file with BicycleParameters." if "hbb" in reported else ""
-        )
-        faults.append(Fault(f"missing: {', '.join(missing)}.{raw}", file=str(path)))
+    if missing := [w for n, w in _FILE_NAMES.items() if w not in reported and n not in _OPTIONAL]:
+        raw = "These are raw measurements; make the Benchmark file with BicycleParameters." if "hbb" in reported else ""
+        faults.append(Fault(f"missing: {', '.join(missing)}. {raw}".strip(), file=str(path)))
     for name, value in found.items():
         if value not in (parameter := _SI[name]).range:
-            message = (
-                f"{_FILE_NAMES[name]} = {value:.6g} is not physical; accepted: {parameter.range} ({parameter.meaning})"
-            )
-            faults.append(Fault(message, file=str(path)))
+            message = f"{_FILE_NAMES[name]} = {value:.6g} is not physical"
+            accepted = f"accepted: {parameter.range} ({parameter.meaning})"
+            faults.append(Fault(f"{message}; {accepted}", file=str(path)))
     if faults:
         raise InputError(faults)
     ordered = {n: found[n] for n in _SI.names if n in found}
@@ -134,7 +133,7 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     )
 
 
-def write_bicycle(bicycle: Bicycle | Mapping[str, float], path: str | PathLike[str]) -> None:
+def write_bicycle(bicycle: Bicycle | Numbers, path: str | PathLike[str]) -> None:
     """Write a bicycle, or the parameters of a ``whipple`` design, as a BicycleParameters file.
 
     The ending of the name selects the format: ``.txt`` and ``.ini`` text, ``.yml`` and ``.yaml`` YAML, which has no
@@ -163,13 +162,14 @@ def write_bicycle(bicycle: Bicycle | Mapping[str, float], path: str | PathLike[s
     missing = [n for n in _SI.names if n not in values and n not in _OPTIONAL]
     if missing:
         raise InputError([Fault(f"missing parameter {', '.join(missing)}", ("parameters",))])
-    rows = {written: (values[n], own.uncertainties.get(n, 0.0)) for n, written in _FILE_NAMES.items() if n in values}
-    rows |= {n: (float(own.others.get(n, 0.0)), 0.0) for n in ("IByy", "IHyy")}
+    numbers = {w: values[n] for n, w in _FILE_NAMES.items() if n in values}
+    numbers |= {n: float(own.others.get(n, 0.0)) for n in ("IByy", "IHyy")}
+    deviations = {_FILE_NAMES[n]: f"+/-{_decimal(u)}" for n, u in own.uncertainties.items() if u}
     if ending in _TEXT:
-        lines = [f"{n} = {_decimal(v)}" + (f"+/-{_decimal(u)}" if u else "") for n, (v, u) in sorted(rows.items())]
+        lines = [f"{n} = {_decimal(x)}{deviations.get(n, '')}" for n, x in sorted(numbers.items())]
     else:
         head = ["parameterization: Meijaard2007", f"parameters: {_quote(own.name)}", "rider: null", "description: ''"]
-        lines = [*head, "values:", *(f"  {n}: {_decimal(v)}" for n, (v, _) in sorted(rows.items()))]
+        lines = [*head, "values:", *(f"  {n}: {_decimal(x)}" for n, x in sorted(numbers.items()))]
     write_text(file, "\n".join(lines) + "\n")
 
 
@@ -183,15 +183,12 @@ def problem_text(bicycle: Bicycle, speed: float | None = None) -> str:
 
     More: docs/how_to/import.md
     """
-    v = speed if speed is not None else bicycle.parameters.get("v", 5.0)
+    values = {"v": 5.0, **bicycle.parameters} | ({} if speed is None else {"v": speed})
     lines = [f"title = {_quote(bicycle.name)}", 'model = "whipple"', "", "[parameters]"]
-    for parameter in _SI.parameters:
-        name = parameter.name
-        value = v if name == "v" else bicycle.parameters.get(name, parameter.default)
-        comment = f"{parameter.meaning}, {parameter.unit}"
-        if name in bicycle.uncertainties:
-            comment += f"; ± {bicycle.uncertainties[name]:.6g}"
-        lines.append(f"{name} = {_decimal(float(value or 0.0))}  # {comment}")
+    for p in _SI.parameters:
+        deviation = f"; ± {bicycle.uncertainties[p.name]:.6g}" if p.name in bicycle.uncertainties else ""
+        number = _decimal(float(values.get(p.name, p.default) or 0.0))
+        lines.append(f"{p.name} = {number}  # {p.meaning}, {p.unit}{deviation}")
     return "\n".join(lines) + "\n"
 
 

@@ -16,7 +16,7 @@ from tmsopt.algebra.kinds import BALLS, NODES
 from tmsopt.errors import Fault, InputError, short, suggest, table_faults
 from tmsopt.models.expression import parse_value
 from tmsopt.models.model import Model, ParameterSet
-from tmsopt.records import Table
+from tmsopt.records import AnyNumbers, Numbers, Table
 
 SAME = 4e-15
 """Accepted relative difference of an exact value from the double of the design: a few roundings, also of a tangent."""
@@ -160,13 +160,11 @@ class ExactDesign:
         """Parameter → fraction, an angle as a `Tilt`; None if a number or a tangent is not a fraction."""
         found: dict[str, Any] = {}
         for name in parameter_set.names:
-            number = self.tangents.get(name, self.values.get(name))
-            if number is None or number.fraction is None:
+            number, tangent = self.tangents.get(name, self.values.get(name)), parameter_set[name].tangent
+            if number is None or number.fraction is None or (tangent and number.fraction and name not in self.tangents):
                 return None
             value = rational(number.fraction)
-            if parameter_set[name].tangent and name not in self.tangents and value != 0:
-                return None
-            found[name] = Tilt(value) if parameter_set[name].tangent else value
+            found[name] = Tilt(value) if tangent else value
         return found
 
     def coefficients(self, model: Model, parameter_set: ParameterSet) -> list[Any] | None:
@@ -194,8 +192,8 @@ class ExactDesign:
 
 def as_exact_design(
     parameter_set: ParameterSet,
-    parameters: Mapping[str, float],
-    stated: Mapping[str, Any] | None = None,
+    parameters: Numbers,
+    stated: AnyNumbers | None = None,
     typed: Mapping[str, str] = MappingProxyType({}),
 ) -> ExactDesign:
     """The exact design of doubles: each is the decimal that prints it, unless an exact number is given.
@@ -218,20 +216,23 @@ def as_exact_design(
     tangents: dict[str, Exact] = {}
     faults = []
     for key, given in (stated or {}).items():
-        if key not in names:
-            faults.append(Fault(f"unknown parameter '{key}'; {suggest(key, names)}", ("exact", key)))
-            continue
-        name = names[key]
-        angle, table = (parameter_set[name].unit == "rad", values) if key == name else (False, tangents)
-        number = _parse(given, angle)
-        if number is None:
-            faults.append(Fault(_not_exact(given, angle), ("exact", key)))
-            continue
-        stored = float(parameters[name]) if key == name else math.tan(parameters[name])
-        if not math.isclose(float(number.ball()), stored, rel_tol=SAME, abs_tol=1e-300):
+        name = names.get(key)
+        angle = key == name and parameter_set[key].unit == "rad"
+        if name is None:
+            message = f"unknown parameter '{key}'; {suggest(key, names)}"
+        elif (number := _parse(given, angle)) is None:
+            found = "a number of more digits" if _is_long(given) else short(given)
+            message = (
+                f"found {found}; accepted: an int, a Fraction, a constant in quotes such as '-2/5' or 'sqrt(2)'"
+                f"{', or an angle such as ' + repr('20 deg') if angle else ''}, of up to {MOST_DIGITS} digits"
+            )
+        else:
+            (values if key == name else tangents)[name] = number
+            stored = float(parameters[name]) if key == name else math.tan(parameters[name])
+            if math.isclose(float(number.ball()), stored, rel_tol=SAME, abs_tol=1e-300):
+                continue
             message = f"found {number}, but the design has {stored!r}; give the exact form of the same number"
-            faults.append(Fault(message, ("exact", key)))
-        table[name] = number
+        faults.append(Fault(message, ("exact", key)))
     if faults:
         raise InputError(faults)
     others = Table({n: v for n, v in values.items() if n not in tangents})
@@ -251,11 +252,3 @@ def _parse(given: Any, angle: bool) -> Exact | None:
         return Exact.from_fraction(decimal(given))
     except (ValueError, TypeError, OverflowError):
         return None
-
-
-def _not_exact(given: Any, angle: bool) -> str:
-    angles = ", or an angle such as '20 deg'" if angle else ""
-    accepted = (
-        f"an int, a Fraction, a constant in quotes such as '-2/5' or 'sqrt(2)'{angles}, of up to {MOST_DIGITS} digits"
-    )
-    return f"found {'a number of more digits' if _is_long(given) else short(given)}; accepted: {accepted}"

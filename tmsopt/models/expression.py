@@ -6,7 +6,7 @@ import math
 import re
 import threading
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache, partial, reduce
@@ -21,6 +21,7 @@ from tmsopt.errors import short, suggest
 from tmsopt.models.advice import advice, call_advice
 from tmsopt.models.names import CONSTANTS, FUNCTIONS, UNSUPPORTED
 from tmsopt.models.stated.degree import DEGREES, Degree, DegreeTooHigh
+from tmsopt.records import AnyNumbers
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 _BINARY = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.Pow: "pow"}
@@ -82,7 +83,7 @@ class Expression:
     comparison: str = ""
     formula: Formula = field(default=Formula((), (), ()), repr=False, compare=False)
 
-    def __call__(self, values: Mapping[str, Any]) -> Any:
+    def __call__(self, values: AnyNumbers) -> Any:
         """The value for numbers of any kind; for a comparison, left minus right.
 
         Numbers in the text are exact fractions, and pi is π. A ball is nan where the value may not exist.
@@ -90,27 +91,26 @@ class Expression:
         left, *right = self.sides(values)
         return left - right[0] if right else left
 
-    def sides(self, values: Mapping[str, Any]) -> tuple[Any, ...]:
+    def sides(self, values: AnyNumbers) -> tuple[Any, ...]:
         """Both sides of a comparison, or the one value."""
         return tuple(float(x) if isinstance(x, np.float64) else x for x in kinds.values(self.formula, values))
 
-    def difference(self, values: Mapping[str, Any], limit: Any) -> Any:
+    def difference(self, values: AnyNumbers, limit: Any) -> Any:
         """Left minus right, with `limit` in place of the constant side."""
         numbers = [self.formula.steps[k].op == CONSTANT for k in self.formula.outputs]
         left, right = (limit if is_number else x for x, is_number in zip(self.sides(values), numbers, strict=True))
         return left - right
 
-    def of(self, values: Mapping[str, Any], kind: Kind) -> Any:
+    def of(self, values: AnyNumbers, kind: Kind) -> Any:
         """The value, or left minus right, in numbers of one kind."""
         left, *right = fold(self.formula, values, kind)
         return kind.operations["sub"](left, right[0]) if right else left
 
-    def violation(self, values: Mapping[str, Any]) -> float:
+    def violation(self, values: AnyNumbers) -> float:
         """Violation of a comparison at a numeric design, relative to the size of its sides; nan if undefined."""
         left, right = self.sides(values)
-        difference = left - right
-        excess = float(self.excess(difference))
-        return excess / max(1.0, abs(left), abs(right)) if math.isfinite(difference) else math.nan
+        excess = float(self.excess(left - right))
+        return excess / max(1.0, abs(left), abs(right)) if math.isfinite(left - right) else math.nan
 
     @property
     def equality(self) -> bool:
@@ -209,10 +209,9 @@ def written_sides(text: str) -> tuple[str, str, str]:
     Raises:
         ExpressionError: if the text is not one comparison.
     """
-    body = _parse(text)
-    if not isinstance(body, ast.Compare) or len(body.ops) > 1 or type(body.ops[0]) not in COMPARISONS:
-        raise ExpressionError(f"{_quote(text)} is not a comparison by <=, >= or ==")
-    return _source(body.left, text), COMPARISONS[type(body.ops[0])], _source(body.comparators[0], text)
+    sign, body = _comparison(text).comparison, _parse(text)
+    assert isinstance(body, ast.Compare)
+    return _source(body.left, text), sign, _source(body.comparators[0], text)
 
 
 def _text(given: object) -> str:
@@ -289,12 +288,12 @@ def _quote(text: str) -> str:
     return f"'{text}'" if len(text) <= _LEGIBLE else f"'{text[: _LEGIBLE - 1]}…'"
 
 
+@dataclass
 class _Parser:
     """Turns the syntax tree of one text into nodes, with an input for each name."""
 
-    def __init__(self, text: str) -> None:
-        self.text = text
-        self.names: dict[str, Node] = {}
+    text: str
+    names: dict[str, Node] = field(default_factory=dict)
 
     def parse(self, node: ast.expr, depth: int = 0) -> _Part:  # noqa: PLR0911, PLR0912 - one case per kind
         """The node of a part; raises unless it is accepted arithmetic."""
@@ -306,15 +305,12 @@ class _Parser:
             case ast.Constant(value=bool()):
                 raise ExpressionError(f"{_quote(text)} uses {node.value!r}; accepted: numbers and names")
             case ast.Constant(value=int() | float() as value):
-                digits = _read_number(node, text)
-                return _Part(constant(digits), DEGREES.constant(float(value)))
+                return _Part(constant(_read_number(node, text)), DEGREES.constant(float(value)))
             case ast.Name(id=name) if name in CONSTANTS:
                 return _Part(PI, DEGREES.constant(math.pi))
+            case ast.Name(id=name) if name in FUNCTIONS:
+                raise ExpressionError(f"{_quote(text)} names the function {name} without an argument; write {name}(…)")
             case ast.Name(id=name):
-                if name in FUNCTIONS:
-                    raise ExpressionError(
-                        f"{_quote(text)} names the function {name} without an argument; write {name}(…)"
-                    )
                 return _Part(self.names.setdefault(name, symbol(name)), Degree())
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
                 return self.parse(operand, depth + 1)
@@ -335,9 +331,8 @@ class _Parser:
                 advised = call_advice(called := _source(node.func, text), [_source(a, text) for a in node.args])
                 raise ExpressionError(f"{_quote(text)} calls '{called}'{advised}; accepted: {' '.join(FUNCTIONS)}")
             case ast.Attribute():
-                raise ExpressionError(
-                    f"{_quote(text)} uses the attribute '{_source(node, text)}'; accepted: plain names"
-                )
+                found = f"uses the attribute '{_source(node, text)}'; accepted: plain names"
+                raise ExpressionError(f"{_quote(text)} {found}")
             case _:
                 found = f"contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}"
                 raise ExpressionError(f"{_quote(text)} {found}")
@@ -346,7 +341,7 @@ class _Parser:
         """An operation on parts; more than two are combined one after the other."""
         parts = [self.parse(operand, depth + 1) for operand in operands]
         try:
-            return reduce(partial(_combine, op), parts) if len(parts) > 1 else _combine(op, *parts)
+            return reduce(partial(_combine, op), parts[1:], parts[0]) if parts[1:] else _combine(op, *parts)
         except DegreeTooHigh as error:
             error.part = error.part or whole
             raise

@@ -1,6 +1,6 @@
 """The rotational inertia at which a two-mass-skate bicycle loses stability, from the equations of Whipple's bicycle."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import flint
@@ -8,7 +8,7 @@ import flint
 from tmsopt.algebra.balls import rational
 from tmsopt.models.bicycles.whipple import whipple
 from tmsopt.models.built_in import controlled
-from tmsopt.records import Table
+from tmsopt.records import Numbers, Table
 from tmsopt.roots import hurwitz_minors, lienard_chipart
 from tmsopt.roots.exact import isolated_roots
 
@@ -18,7 +18,7 @@ INERTIAS = {"I_Bxx": "m_B", "I_Bzz": "m_B", "I_Hxx": "m_H", "I_Hzz": "m_H"}
 _BITS = 400  # precision of tan λ_s and its secant, the only irrational numbers here
 
 
-def inertia_margin(parameters: Mapping[str, float]) -> Table[float | None] | None:
+def inertia_margin(parameters: Numbers) -> Table[float | None] | None:
     """The least value in kg m² of each moment of inertia, the others 0, at which a design is no longer stable.
 
     Whipple's equations without wheels, trail and inertia are those of two masses on skates. Their coefficients are

@@ -15,18 +15,21 @@ import numpy as np
 from tmsopt.algebra.balls import as_ball
 from tmsopt.algebra.formula import Formula, fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS, kind_of
-from tmsopt.records import Table
+from tmsopt.records import AnyNumbers, Numbers, Table
 
 _BITS = 106  # precision of balls, whose radii then come from the roundings of the parameters alone
 _EPSILON = 2.0**-53
 _NEGLIGIBLE = 1e-9  # of a range: a smaller parameter counts as 0
 _PAGE = 3000  # most characters of a formula in LaTeX
 
-NumberFunction = Callable[[Mapping[str, Any]], Any]
+NumberFunction = Callable[[AnyNumbers], Any]
 """Function of named numbers that uses ``+ - * /`` and the operations of `tmsopt.algebra.kinds`, so it can be traced."""
 
 Matrix = list[list[Any]]
 """Rows of numbers of any kind."""
+
+Matrices = tuple[Matrix, ...]
+"""Matrices of a matrix polynomial, in descending powers."""
 
 ROOTS = ("abscissa", "damping_ratio", "angular_frequency")
 """Quantities of the roots that formulas may use."""
@@ -67,18 +70,13 @@ class Range:
     closed: bool = True
 
     def __contains__(self, value: float) -> bool:
-        if self.closed:
-            return self.lower <= value <= self.upper
-        return self.lower < value < self.upper
+        is_end = value in (self.lower, self.upper)
+        return self.lower <= value <= self.upper and (self.closed or not is_end)
 
     def __str__(self) -> str:
-        at_most, at_least = ("<=", ">=") if self.closed else ("<", ">")
-        ends = []
-        if np.isfinite(self.lower):
-            ends.append(f"{at_least} {self.lower:.6g}")
-        if np.isfinite(self.upper):
-            ends.append(f"{at_most} {self.upper:.6g}")
-        return " and ".join(ends) or "any finite number"
+        ends = zip("><", (self.lower, self.upper), strict=True)
+        texts = [f"{sign}{'=' * self.closed} {end:.6g}" for sign, end in ends if np.isfinite(end)]
+        return " and ".join(texts) or "any finite number"
 
 
 @dataclass(frozen=True)
@@ -150,7 +148,7 @@ class Quantity:
     meaning: str
     latex: str
     value: NumberFunction
-    equation: Callable[[Mapping[str, Any], Any], Any] | None = None
+    equation: Callable[[AnyNumbers, Any], Any] | None = None
     range: Range = Range()
     pieces: tuple[NumberFunction, ...] = ()
     counterpart: "Quantity | None" = None
@@ -175,17 +173,14 @@ class Quantity:
         return formula(piece(_SYMBOLS) for piece in self.pieces)
 
 
-class _Symbols(Mapping[str, Any]):
+class _Symbols(dict[str, Any]):
     """Maps every name to its symbol."""
 
     def __getitem__(self, name: str) -> Any:
         return symbol(name)
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(())
-
-    def __len__(self) -> int:
-        return 0
+    def __contains__(self, name: object) -> bool:
+        return True
 
 
 _SYMBOLS = _Symbols()
@@ -212,7 +207,7 @@ class ParameterSet:
 
     name: str
     parameters: tuple[Parameter, ...]
-    native: Callable[[Mapping[str, Any]], dict[str, Any]]
+    native: Callable[[AnyNumbers], dict[str, Any]]
     quantities: tuple[Quantity, ...] = ()
     rate: NumberFunction | None = None
     root_unit: str = "1"
@@ -270,15 +265,15 @@ class Model:
     title: str
     degree: int
     sets: tuple[ParameterSet, ...]
-    algebraic: Callable[[Mapping[str, Any]], dict[str, Any]]
+    algebraic: Callable[[AnyNumbers], dict[str, Any]]
     polynomial: Callable[..., list[Any]]
     quantities: tuple[Quantity, ...] = ()
     compact: Callable[..., list[Any]] | None = None
-    pencil: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = None
-    feedback: Callable[[Mapping[str, Any]], Feedback] | None = None
+    pencil: Callable[[AnyNumbers], Matrices] | None = None
+    feedback: Callable[[AnyNumbers], Feedback] | None = None
     natural: bool = False
     origin: tuple[Callable[..., "Model"], tuple[Any, ...]] | None = None
-    statement: Mapping[str, Any] | None = None
+    statement: AnyNumbers | None = None
     numbers: tuple[str, ...] = ()
     words: tuple[str, str] = ("flutter", "divergence")
     omits: str = ""
@@ -287,7 +282,7 @@ class Model:
     absent: Mapping[str, str] = Table()
     carrier: float | None = None
     carried: Callable[[Mapping[str, tuple[float, float]]], "Model"] | None = None
-    double: Callable[[Mapping[str, Any]], tuple[Matrix, ...]] | None = None
+    double: Callable[[AnyNumbers], Matrices] | None = None
 
     def __repr__(self) -> str:
         return f"Model(name={self.name!r}, title={self.title!r}, degree={self.degree}, natural={self.natural})"
@@ -298,11 +293,11 @@ class Model:
         is_unchanged = origin and (origin[0] is not resolve_name or resolve_name(*origin[1]) is self)
         return origin if is_unchanged else super().__reduce_ex__(protocol)
 
-    def coefficients(self, parameters: Mapping[str, Any], of: ParameterSet | None = None) -> list[Any]:
+    def coefficients(self, parameters: AnyNumbers, of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for numbers of any kind: floats, arrays, CasADi, balls."""
         return self.computed(of or self.sets[0], parameters)[1]
 
-    def computed(self, of: ParameterSet, parameters: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
+    def computed(self, of: ParameterSet, parameters: AnyNumbers) -> tuple[dict[str, Any], list[Any]]:
         """Native parameters and coefficients for numbers of any kind."""
         kind, native = kind_of(*parameters.values()), self.sets[0].names
         with np.errstate(all="ignore"):
@@ -317,8 +312,8 @@ class Model:
         found = {}
         for of in self.sets:
             native = of.native({n: symbol(n) for n in of.names})
-            listed = [native[n] for n in self.sets[0].names]
-            found[of.name] = formula([*listed, *self.polynomial(**self.algebraic(native))], of.names)
+            coefficients = self.polynomial(**self.algebraic(native))
+            found[of.name] = formula([*(native[n] for n in self.sets[0].names), *coefficients], of.names)
         return found
 
     def within(self, ranges: Mapping[str, tuple[float, float]]) -> "Model":
@@ -340,10 +335,11 @@ class Model:
 
     @cached_property
     def _coefficient_names(self) -> tuple[str, ...]:
-        taken = {n for of in self.sets for n in (*of.names, *(q.name for q in of.quantities))}
-        taken |= {q.name for q in self.quantities}
-        plain = tuple(f"a{k}" for k in range(self.degree + 1))
-        return plain if taken.isdisjoint(plain) else tuple(f"coefficient{k}" for k in range(self.degree + 1))
+        taken = {q.name for of in self.sets for q in (*self.quantities, *of.quantities)} | {
+            n for of in self.sets for n in of.names
+        }
+        plain, long = ([f"{word}{k}" for k in range(self.degree + 1)] for word in ("a", "coefficient"))
+        return tuple(plain if taken.isdisjoint(plain) else long)
 
     def quantity_names(self, of: ParameterSet) -> tuple[str, ...]:
         """Names that an expression may use besides the parameters of a set and the quantities of the roots."""
@@ -402,10 +398,10 @@ class Values(Mapping[str, Any]):
         self,
         model: Model,
         of: ParameterSet,
-        parameters: Mapping[str, Any],
+        parameters: AnyNumbers,
         extra: Iterable[Quantity] = (),
         lift: Callable[[Quantity, "Values"], Any] | None = None,
-        ranges: Mapping[str, float] | None = None,
+        ranges: Numbers | None = None,
     ) -> None:
         native, self.coefficients = model.computed(of, parameters)
         self.model, self.kind = model, kind_of(*parameters.values())
@@ -427,7 +423,7 @@ class Values(Mapping[str, Any]):
             self._found[name] = value
         return self._found[name]
 
-    def fold(self, formula: Formula, own: Mapping[str, Any] = MappingProxyType({})) -> list[Any]:
+    def fold(self, formula: Formula, own: AnyNumbers = MappingProxyType({})) -> list[Any]:
         """Outputs of a formula in these values and those of `own`; unknown quantities of the roots are nan."""
         unknown = dict.fromkeys(ROOTS, np.nan)
         known = {n: own[n] if n in own else self[n] if n in self else unknown[n] for n in formula.inputs}
@@ -441,10 +437,9 @@ class Values(Mapping[str, Any]):
         sizes |= {n: width for n, width in ranges.items() if sizes[n] <= _NEGLIGIBLE * width}
         with flint.ctx.workprec(_BITS):
             balls = {n: flint.arb(float(x), sizes[n] * _EPSILON) for n, x in parameters.items()}
-            found = model.coefficients(balls, of)
-        return [float(c.rad()) if c.is_finite() else np.inf for c in found]
+            return [float(c.rad()) if c.is_finite() else np.inf for c in model.coefficients(balls, of)]
 
-    def with_known(self, known: Mapping[str, Any]) -> "Values":
+    def with_known(self, known: AnyNumbers) -> "Values":
         """Values of the same design, with given numbers in place of some formulas."""
         other = copy(self)
         other._known, other._found = {**self._known, **known}, {}

@@ -21,10 +21,6 @@ class Typeset(NamedTuple):
         return self.text if self.precedence >= least else rf"\left({self.text}\right)"
 
 
-def _difference(a: Typeset, b: Typeset) -> Typeset:
-    return Typeset(f"{a.text} - {b.enclose(_PRODUCT)}", _SUM)
-
-
 def _sum(a: Typeset, b: Typeset) -> Typeset:
     return Typeset(f"{a.text} - {b.text[1:]}" if b.text.startswith("-") else f"{a.text} + {b.text}", _SUM)
 
@@ -32,10 +28,6 @@ def _sum(a: Typeset, b: Typeset) -> Typeset:
 def _product(a: Typeset, b: Typeset) -> Typeset:
     dot = r" \cdot " if b.text[:1].isdigit() else r" \, "
     return Typeset(f"{a.enclose(_PRODUCT)}{dot}{b.enclose(_PRODUCT)}", _PRODUCT)
-
-
-def _fraction(a: Typeset, b: Typeset) -> Typeset:
-    return Typeset(rf"\frac{{{a.text}}}{{{b.text}}}", _POWER)
 
 
 def _power(a: Typeset, b: Typeset) -> Typeset:
@@ -73,9 +65,9 @@ LATEX = Kind(
         **{name: _function(rf"\{name}") for name in ("exp", "log", "sin", "cos", "tan", "min", "max")},
         **{f"a{name}": _function(rf"\arc{name}") for name in ("sin", "cos", "tan")},
         "add": _sum,
-        "sub": _difference,
+        "sub": lambda a, b: Typeset(f"{a.text} - {b.enclose(_PRODUCT)}", _SUM),
         "mul": _product,
-        **dict.fromkeys(("div", "quotient", "ratio"), _fraction),
+        **dict.fromkeys(("div", "quotient", "ratio"), lambda a, b: Typeset(rf"\frac{{{a.text}}}{{{b.text}}}", _POWER)),
         "neg": lambda a: Typeset(f"-{a.enclose(_PRODUCT)}", _SUM),
         "pow": _power,
         "square": lambda a: _power(a, Typeset("2")),

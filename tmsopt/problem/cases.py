@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.records import Table
+from tmsopt.records import AnyNumbers, Numbers, Table
 
 POINTS = 7
 """Points of a band in the first search; more are added where the worst case lies between them."""
@@ -63,14 +63,12 @@ class Case:
     More: docs/how_to/bands.md
     """
 
-    at: Mapping[str, float] = Table()
-    offset: Mapping[str, float] = Table()
-    direction: Mapping[str, float] = Table()
+    at: Numbers = Table()
+    offset: Numbers = Table()
+    direction: Numbers = Table()
     edge: str = ""
 
-    def applied(
-        self, parameters: Mapping[str, Any], radius: Any = 0.0, weights: Mapping[str, float] | None = None
-    ) -> dict[str, Any]:
+    def applied(self, parameters: AnyNumbers, radius: Any = 0.0, weights: Numbers | None = None) -> dict[str, Any]:
         """The varied design, for numbers, arrays or CasADi expressions."""
         varied = {**parameters, **self.at}
         for name, change in self.offset.items():
@@ -81,7 +79,7 @@ class Case:
         return varied
 
 
-def weight_of(name: str, value: Any, weights: Mapping[str, float]) -> Any:
+def weight_of(name: str, value: Any, weights: Numbers) -> Any:
     """Weight of a parameter: the given one, else its size, or 1 if it is 0."""
     if name in weights:
         return weights[name]
@@ -124,7 +122,7 @@ def middle_of(scenario: Scenario) -> float:
 
 
 def first_cases(
-    scenarios: Mapping[str, Scenario], tolerances: Mapping[str, float], directions: Sequence[str] = ()
+    scenarios: Mapping[str, Scenario], tolerances: Numbers, directions: Sequence[str] = ()
 ) -> tuple[Case, ...]:
     """Scenario points combined with corners of the tolerance box, and a step either way in each direction."""
     points = itertools.product(*(points_of(s) for s in scenarios.values()))

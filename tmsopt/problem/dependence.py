@@ -85,34 +85,24 @@ def stability_limit(problem: Posed, steady: float = _STEADY) -> dict[str, str]:
     return {STABLE: f"abscissa <= {0.0 - least!r}"}
 
 
-def _only_worsens(problem: Posed, name: str, worse: float) -> bool:
-    """Whether the objective improves only as a quantity gets worse."""
-    goal = problem.objective
-    if goal is None or name not in goal.names:
-        return False
-    return _can_fall(problem, problem.sign, goal, name, worse) and not _can_fall(
-        problem, problem.sign, goal, name, -worse
-    )
-
-
 def sense_notes(problem: Posed) -> tuple[str, ...]:
     """A note if the objective improves only as stability gets worse."""
-    text = (problem.minimize or problem.maximize or "").strip()
-    if not problem.free or not any(_only_worsens(problem, name, worse) for name, worse in _LESS_STABLE.items()):
+    sign, goal, text = problem.sign, problem.objective, problem.goal
+    named = {n: worse for n, worse in _LESS_STABLE.items() if problem.free and goal and n in goal.names}
+    if not goal or not any(
+        _can_fall(problem, sign, goal, n, worse) and not _can_fall(problem, sign, goal, n, -worse)
+        for n, worse in named.items()
+    ):
         return ()
-    opposite = {"minimize": "maximize", "maximize": "minimize"}[problem.sense]
-    other = f'{opposite} = "{text}"'
+    other = f'{"maximize" if problem.maximize is None else "minimize"} = "{text}"'
     return (f"{problem.sense} {text} asks for the least stable design; write {other} for the most stable one",)
 
 
 def demands_heavy_damping(problem: Posed) -> bool:
     """Whether a constraint on the damping ratio allows only 1: all roots real and negative."""
-    for condition in problem.conditions.values():
-        if condition.names == ("damping_ratio",):
-            below, at = (float(condition({"damping_ratio": ratio})) for ratio in (1 - 1e-9, 1.0))
-            if condition.holds(at) and condition.excess(below) > 0:
-                return True
-    return False
+    below, at = ({"damping_ratio": ratio} for ratio in (1 - 1e-9, 1.0))
+    asked = (c for c in problem.conditions.values() if c.names == ("damping_ratio",))
+    return any(c.holds(float(c(at))) and not c.holds(float(c(below))) for c in asked)
 
 
 def _can_fall(problem: Posed, sign: float, expression: Expression, name: str, worse: float) -> bool:
@@ -124,18 +114,15 @@ def _can_fall(problem: Posed, sign: float, expression: Expression, name: str, wo
     if side := limit_side(expression.text, name):
         return expression.equality or sign * worse * side < 0
     rng = np.random.default_rng(0)
-    ends = np.array([problem.free[n] for n in problem.free]).reshape(-1, 2)
+    ends = np.array([*problem.free.values()]).reshape(-1, 2)
     for _ in range(_DESIGNS):
         drawn = problem.ordered(dict(zip(problem.free, rng.uniform(*ends.T).tolist(), strict=True)))
-        drawn_of = [n for n in ROOT_NAMES if n != ANGULAR_FREQUENCY or n in expression.names]
-        found = {n: float(rng.choice((-1, 1)) * 10 ** rng.uniform(-_DECADES, _DECADES)) for n in drawn_of}
-        found |= {"damping_ratio": float(rng.uniform(-1, 1))}
-        found |= {n: abs(found[n]) for n in (ANGULAR_FREQUENCY, RADIUS) if n in found}
-        if name not in found:
-            found[name] = float(rng.uniform(0.1, 2.0))
+        found = {n: float(rng.choice((-1, 1)) * 10 ** rng.uniform(-_DECADES, _DECADES)) for n in ROOT_NAMES}
+        found |= {n: abs(found[n]) for n in (ANGULAR_FREQUENCY, RADIUS)} | {"damping_ratio": float(rng.uniform(-1, 1))}
+        value = found.setdefault(name, float(rng.uniform(0.1, 2.0)))
         before, after = (
-            float(expression(problem.values(drawn).with_known({**found, name: value})))
-            for value in (found[name], found[name] + worse * _STEP * min(1.0, abs(found[name])))
+            float(expression(problem.values(drawn).with_known(found | {name: x})))
+            for x in (value, value + worse * _STEP * min(1.0, abs(value)))
         )
         change = sign * (after - before)
         if change < 0 or (expression.equality and change != 0):

@@ -19,6 +19,7 @@ from tmsopt.models.expression import Expression, ExpressionError
 from tmsopt.models.model import ROOTS
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, regularise
+from tmsopt.records import AnyNumbers
 from tmsopt.roots import find_motion, roots
 
 
@@ -35,7 +36,7 @@ class ArrayFunction:
     formula: Formula = field(repr=False)
     names: tuple[str, ...]
 
-    def __call__(self, columns: Mapping[str, Any]) -> dict[str, Any]:
+    def __call__(self, columns: AnyNumbers) -> dict[str, Any]:
         """Values of the expressions, left minus right for a comparison; nan if undefined.
 
         Args:
@@ -50,7 +51,7 @@ class ArrayFunction:
         return dict(zip(self.names, evaluate_on_arrays(self.formula, {**columns, **known}), strict=True))
 
 
-def evaluate(problem: Posed, expressions: Iterable[str | Expression], columns: Mapping[str, Any]) -> list[Any]:
+def evaluate(problem: Posed, expressions: Iterable[str | Expression], columns: AnyNumbers) -> list[Any]:
     """Values of expressions in their order, by an `ArrayFunction` from a cache."""
     return list(_cached_function(problem, tuple(expressions))(columns).values())
 
@@ -73,7 +74,7 @@ def _cached_function(problem: Posed, expressions: tuple[str | Expression, ...]) 
     return array_function(problem, {f"{k}": e for k, e in enumerate(expressions)})
 
 
-def coefficients_of(problem: Posed, columns: Mapping[str, Any]) -> list[Any]:
+def coefficients_of(problem: Posed, columns: AnyNumbers) -> list[Any]:
     """Coefficients of designs, each in the shape of the columns that it depends on."""
     return evaluate_on_arrays(coefficient_formula(problem.model, problem.parameter_set.name), columns)
 
@@ -114,7 +115,7 @@ def parse_all(problem: Posed, expressions: Mapping[str, str | Expression]) -> di
         InputError: listing every text that is no expression of this problem.
     """
     found: dict[str, Expression] = {}
-    faults: list[Fault] = []
+    faults = []
     for name, given in expressions.items():
         try:
             found[name] = given if isinstance(given, Expression) else problem.read(given)

@@ -18,7 +18,7 @@ from tmsopt.problem.freedom import find_question_faults
 from tmsopt.problem.model_table import stated_model
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
-from tmsopt.problem.toml import Number, Page, Section, read_page, validate_tables
+from tmsopt.problem.toml import Number, Page, Section, Tables, read_page, validate_tables
 from tmsopt.problem.validate import VARIATIONS
 
 _NO_PARAMETERS = "missing section [parameters]"
@@ -104,7 +104,7 @@ def load(path: str | PathLike[str]) -> Problem:
 
     More: docs/reference/problem_file.md
     """
-    return _load_problem(path)
+    return _load_problem(path, lambda problem: [])
 
 
 def pose(given: object) -> Posed:
@@ -113,7 +113,7 @@ def pose(given: object) -> Posed:
     Raises:
         InputError: for a file with faults, or for anything else.
     """
-    return _pose(given)
+    return _pose(given, lambda problem: [])
 
 
 def as_solvable(given: object, front: bool = False) -> Posed:
@@ -125,20 +125,20 @@ def as_solvable(given: object, front: bool = False) -> Posed:
     return _pose(given, lambda problem: [] if front and problem.pareto else find_question_faults(problem))
 
 
-def _pose(given: object, faults_of: Callable[[Posed], list[Fault]] = lambda problem: []) -> Posed:
+def _pose(given: object, faults_of: Callable[[Posed], list[Fault]]) -> Posed:
     if isinstance(given, str | PathLike):
         return _load_problem(given, faults_of).posed
-    if not isinstance(given, Problem | Posed | Solution):
+    stated = given.problem if isinstance(given, Solution) else given
+    if not isinstance(stated, Problem | Posed):
         message = f"found {short(given)}; accepted: a Problem, the path of a problem file, or a Solution"
         raise InputError([Fault(message, ("problem",))])
-    stated = given.problem if isinstance(given, Solution) else given
     posed = stated if isinstance(stated, Posed) else stated.posed
     if faults := faults_of(posed):
         raise InputError(faults)
     return posed
 
 
-def _load_problem(path: str | PathLike[str], faults_of: Callable[[Posed], list[Fault]] = lambda problem: []) -> Problem:
+def _load_problem(path: str | PathLike[str], faults_of: Callable[[Posed], list[Fault]]) -> Problem:
     page = read_page(path, "problem")
     if "parameters" not in page.data and {"problem", "study", "vary"} & set(page.data):
         written = page.data.get("problem")
@@ -147,17 +147,16 @@ def _load_problem(path: str | PathLike[str], faults_of: Callable[[Posed], list[F
         raise InputError([Fault(message, file=page.file)])
     faults, problem = problem_from_tables(_add_bicycle_parameters(page), escape_unprintable(Path(page.file).stem))
     if problem is not None and not faults:  # a misspelt [objective] is no missing one
-        faults = [*faults, *faults_of(problem.posed)]
+        faults = faults_of(problem.posed)
     if problem is None or faults:
         raise page.error(faults)
     return problem
 
 
-def _add_bicycle_parameters(page: Page) -> Mapping[str, Any]:
+def _add_bicycle_parameters(page: Page) -> Tables:
     """The tables with the parameters of their `bicycle` file; the file's own parameters take precedence."""
-    data = page.data
-    named = data.get("bicycle")
-    if not isinstance(named, str) or not isinstance(given := data.get("parameters", {}), dict):
+    data, named, given = page.data, page.data.get("bicycle"), page.data.get("parameters", {})
+    if not isinstance(named, str) or not isinstance(given, dict):
         return data
     try:
         bicycle = read_bicycle(Path(page.file).parent / named)
@@ -166,56 +165,51 @@ def _add_bicycle_parameters(page: Page) -> Mapping[str, Any]:
             f if f.line else Fault(f"{short(named)} {f.message}; the name is relative to this file", ("bicycle",))
             for f in error.faults
         ) from None
-    scenarios = data.get("scenarios", {})
-    measured = {n: v for n, v in bicycle.parameters.items() if n not in scenarios}
+    measured = {n: v for n, v in bicycle.parameters.items() if n not in data.get("scenarios", {})}
     return {"model": "whipple", **data, "parameters": {**measured, **given}}
 
 
-def problem_from_tables(data: Mapping[str, Any], title: str) -> tuple[list[Fault], Problem | None]:
+def problem_from_tables(data: Tables, title: str) -> tuple[list[Fault], Problem | None]:
     """The faults of a problem file's tables, and the problem.
 
     Args:
         title: used if the file has none.
     """
     gains_faults, gains, data = _split_gains(data)
-    shape_faults, parsed = validate_tables(data, _File, _explain_shape)
-    if any(hint in f.message for f in shape_faults for hint in ("did you mean 'parameters'", "write [parameters]")):
-        shape_faults = [f for f in shape_faults if f.message != _NO_PARAMETERS]  # present under a misspelt name
+    faults, parsed = validate_tables(data, _File, _explain_shape)
+    if any(hint in f.message for f in faults for hint in ("did you mean 'parameters'", "write [parameters]")):
+        faults = [f for f in faults if f.message != _NO_PARAMETERS]  # present under a misspelt name
     model_faults, model = _find_model(data.get("model", "tms"))
-    shape_faults += model_faults
-    faults, problem = shape_faults, None
+    faults += model_faults
+    problem = None
     if model is not None and parsed is not None:
         tables = _collect_tables(parsed)
-        for fault in shape_faults:
+        for fault in faults:
             if fault.key[:1] in (("parameters",), ("scenarios",)) and len(fault.key) > 1:
                 tables["fixed"][fault.key[1]] = math.nan  # given, and its fault already reported
+        objective = vars(parsed.objective) | {"pareto": parsed.objective.pareto or ()}
+        title = parsed.title.strip() or title
         try:
-            problem = Problem(
-                model=model,
-                constraints=parsed.constraints,
-                title=parsed.title.strip() or title,
-                **tables,
-                **vars(parsed.objective) | {"pareto": parsed.objective.pareto or ()},
-            )
+            problem = Problem(model=model, constraints=parsed.constraints, title=title, **tables, **objective)
         except InputError as error:
             reported = {f.key[:2] for f in faults} | {("parameters", *f.key[1:2]) for f in faults}
             reported |= {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
-            faults = faults + [f for f in error.faults if f.key[:2] not in reported]
+            faults += [f for f in error.faults if f.key[:2] not in reported]
     typed = [replace(f, key=("feedback", *f.key[1:])) if {*f.key[1:2]} & gains else f for f in faults]
     return gains_faults + typed, problem
 
 
-def _split_gains(data: Mapping[str, Any]) -> tuple[list[Fault], set[str], Mapping[str, Any]]:
+def _split_gains(data: Tables) -> tuple[list[Fault], set[str], Tables]:
     """Faults of [feedback], its valid names, and the tables with the gains among the parameters."""
     gains, parameters, model = data.get("feedback", {}), data.get("parameters", {}), data.get("model", "tms")
-    if not isinstance(gains, dict) or not isinstance(parameters, dict):
+    if not gains or not isinstance(gains, dict) or not isinstance(parameters, dict):
         return [], set(), data
-    known = gain_names(model) if isinstance(model, str) and gains else ()
-    if gains and not known:
+    others = {k: v for k, v in data.items() if k != "feedback"}
+    known = gain_names(model) if isinstance(model, str) else ()
+    if not known:
         message = "is for the bicycles tms and whipple; write B, C and G in [model] for your own system"
         misspelt = isinstance(model, str) and model not in MODELS  # reported elsewhere
-        found = [] if misspelt else [Fault(message, ("feedback",))]
-        return found, set(), {k: v for k, v in data.items() if k != "feedback"}
+        return [] if misspelt else [Fault(message, ("feedback",))], set(), others
     faults = []
     for name in gains:
         if name not in known:
@@ -223,7 +217,6 @@ def _split_gains(data: Mapping[str, Any]) -> tuple[list[Fault], set[str], Mappin
         elif name in parameters:
             faults.append(Fault(f"'{name}' is in [parameters] too; keep one", ("feedback", name)))
     own = {n: v for n, v in gains.items() if n in known}
-    others = {k: v for k, v in data.items() if k != "feedback"}
     return faults, set(own), {**others, "parameters": {**parameters, **own}} if own else others
 
 
@@ -233,9 +226,10 @@ def _find_model(written: Any) -> tuple[list[Fault], Model | None]:
         return stated_model(written)
     if not isinstance(written, str):
         return [], None  # reported with the shape of the file
-    model = MODELS.get(written)
+    if written in MODELS:
+        return [], MODELS[written]
     unknown = f"unknown model {short(written)}; {suggest(written, MODELS)}; your own goes in a table [model]"
-    return ([Fault(unknown, ("model",))] if model is None else []), model
+    return [Fault(unknown, ("model",))], None
 
 
 _ENTRIES: Mapping[str, tuple[type[Section], str]] = {
@@ -284,15 +278,12 @@ def _explain_shape(where: tuple[int | str, ...], kind: str, found: Any) -> Fault
 def _collect_tables(written: _File) -> dict[str, Any]:
     """The tables of a problem, numbers as typed."""
     free = {n: v for n, v in written.parameters.items() if isinstance(v, _FreeParameter)}
-
-    def scenario(s: Any) -> Any:
-        return s if isinstance(s, list) else Band(s.min, s.max, s.points)
-
+    bands = {n: Band(**vars(s)) for n, s in written.scenarios.items() if isinstance(s, _Band)}
     return {
         "fixed": {n: v for n, v in written.parameters.items() if n not in free},
         "free": {n: (v.min, v.max) for n, v in free.items()},
         "start": {n: v.start for n, v in free.items() if v.start is not None},
-        "scenarios": {n: scenario(s) for n, s in written.scenarios.items()},
+        "scenarios": {**written.scenarios, **bands},
         "tolerances": written.tolerances,
         "weights": written.weights,
     }

@@ -28,8 +28,8 @@ def split_limit(text: str) -> WrittenLimit | None:
     """
     left, sign, right = written_sides(text)
     for before, side, behind in (("", left, f" {sign} {right}"), (f"{left} {sign} ", right, "")):
-        if _NUMBER.fullmatch(_remove_blanks(side)):
-            return WrittenLimit(before, float(_remove_blanks(side)), behind)
+        if _NUMBER.fullmatch(number := _remove_blanks(side)):
+            return WrittenLimit(before, float(number), behind)
     return None
 
 

@@ -1,13 +1,14 @@
 """Reads the [model] table of a problem file: the user's own system as matrices or coefficients of expressions."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from tmsopt.errors import Fault, is_number, limit_advice, short, suggest, text_faults
 from tmsopt.models import Model, Unfit, from_coefficients, from_hamiltonian, from_matrices
 from tmsopt.models.model import Matrix
 from tmsopt.models.stated.texts import parse_entries, place
+from tmsopt.problem.toml import Tables
 
 _MATRICES = ("M", "D", "K", "A", "B", "C", "G", "H")
 KEYS = {
@@ -39,7 +40,7 @@ _EXAMPLE = (
 )
 
 
-def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
+def stated_model(table: Tables) -> tuple[list[Fault], Model | None]:
     """The faults of a [model] table, and its model.
 
     An entry is a number or an expression. Each name in it is a parameter, or one of ``[model.quantities]``, which may
@@ -68,11 +69,12 @@ def stated_model(table: Mapping[str, Any]) -> tuple[list[Fault], Model | None]:
     if faults:
         return faults, None
     try:
+        stated: dict[str, Any] = {**entries, "name": name.strip(), "quantities": quantities}
         if "H" in entries:
-            return [], from_hamiltonian(entries["H"], name=name.strip(), quantities=quantities)
+            return [], from_hamiltonian(**stated)
         if "coefficients" in entries:
-            return [], from_coefficients(entries["coefficients"][0], name=name.strip(), quantities=quantities)
-        return [], from_matrices(**entries, name=name.strip(), quantities=quantities)
+            return [], from_coefficients(**stated | {"coefficients": entries["coefficients"][0]})
+        return [], from_matrices(**stated)
     except Unfit as error:
         where, _, rest = error.message.partition(": ")
         if error.key == "quantities" and where in quantities:
@@ -109,12 +111,9 @@ def _rows(written: Any, key: str, fault: Callable[..., None]) -> Matrix:
         if not isinstance(row, list) or not row:
             fault(f"found {short(row)}; {_DESCENDING}", key)
             return []
-    return [[_entry(x, key, i, j, fault) for j, x in enumerate(row, start=1)] for i, row in enumerate(rows, start=1)]
-
-
-def _entry(x: Any, key: str, i: int, j: int, fault: Callable[..., None]) -> Any:
-    if is_number(x) or isinstance(x, str):
-        return x
-    where = place(key, i, j)
-    fault(f"{where}: found {short(x)}; accepted: a finite number, or an expression in quotes", key)
-    return 0
+    for i, row in enumerate(rows, start=1):
+        for j, x in enumerate(row, start=1):
+            if not is_number(x) and not isinstance(x, str):
+                found = f"{place(key, i, j)}: found {short(x)}"
+                fault(f"{found}; accepted: a finite number, or an expression in quotes", key)
+    return [[x if is_number(x) or isinstance(x, str) else 0 for x in row] for row in rows]

@@ -24,7 +24,7 @@ from tmsopt.problem.quantities import (
     expand_names,
     root_names,
 )
-from tmsopt.records import Table
+from tmsopt.records import AnyNumbers, Numbers, Table
 from tmsopt.roots import Pattern
 from tmsopt.versions import SCHEMA
 
@@ -34,17 +34,17 @@ class _Fields:
     """The fields of a problem, as stated and as solved."""
 
     model: Model
-    fixed: Mapping[str, float]
+    fixed: Numbers
     free: Mapping[str, tuple[float, float]]
     constraints: Mapping[str, str]
     minimize: str | None
     maximize: str | None
     locate: str | None
-    start: Mapping[str, float]
+    start: Numbers
     title: str
     scenarios: Mapping[str, Scenario]
-    tolerances: Mapping[str, float]
-    weights: Mapping[str, float]
+    tolerances: Numbers
+    weights: Numbers
     pareto: Sequence[str]
     units: Mapping[str, str] = field(compare=False)
     written: Mapping[str, Mapping[float, str]] = field(compare=False)
@@ -92,17 +92,17 @@ class Problem(_Fields):
     def __init__(
         self,
         model: Model,
-        fixed: Mapping[str, Any] = Table(),
-        free: Mapping[str, Any] = Table(),
+        fixed: AnyNumbers = Table(),
+        free: AnyNumbers = Table(),
         constraints: Mapping[str, str] = Table(),
         minimize: str | None = None,
         maximize: str | None = None,
         locate: str | None = None,
-        start: Mapping[str, Any] = Table(),
+        start: AnyNumbers = Table(),
         title: str = "",
-        scenarios: Mapping[str, Scenario | Sequence[Any] | Mapping[str, Any]] = Table(),
-        tolerances: Mapping[str, Any] = Table(),
-        weights: Mapping[str, Any] = Table(),
+        scenarios: Mapping[str, Scenario | Sequence[Any] | AnyNumbers] = Table(),
+        tolerances: AnyNumbers = Table(),
+        weights: AnyNumbers = Table(),
         pareto: Sequence[str] = (),
         units: Mapping[str, str] = Table(),
         written: Mapping[str, Mapping[float, str]] = Table(),
@@ -201,8 +201,7 @@ class Posed(_Fields):
     @cached_property
     def objective(self) -> Expression | None:
         """The expression to optimise; None without one."""
-        text = self.minimize if self.minimize is not None else self.maximize
-        return None if text is None else self.read(text)
+        return next((self.read(text) for text in (self.minimize, self.maximize) if text is not None), None)
 
     @cached_property
     def objectives(self) -> tuple[Expression, ...]:
@@ -212,8 +211,7 @@ class Posed(_Fields):
     @cached_property
     def conditions(self) -> dict[str, Expression]:
         """The constraints, parsed."""
-        of = self.parameter_set
-        texts = {name: expand_names(text, of) for name, text in self.constraints.items()}
+        texts = {name: expand_names(text, self.parameter_set) for name, text in self.constraints.items()}
         return {name: parse_comparison(text, self.vocabulary) for name, text in texts.items()}
 
     def read(self, text: str) -> Expression:
@@ -235,27 +233,27 @@ class Posed(_Fields):
         of = self.parameter_set
         return (*of.names, *self.model.quantity_names(of), *root_names(self.model))
 
-    def values(self, parameters: Mapping[str, float]) -> Values:
+    def values(self, parameters: Numbers) -> Values:
         """Everything derived from a numeric design, including root quantities."""
         ranges = {n: hi - lo for n, (lo, hi) in self.free.items()}
         extra = (*ROOT_QUANTITIES, NO_RADIUS, STRUCTURE)
         return Values(self.model, self.parameter_set, parameters, extra=extra, ranges=ranges)
 
-    def typed(self, parameters: Mapping[str, float]) -> dict[str, str]:
+    def typed(self, parameters: Numbers) -> dict[str, str]:
         """Parameter → exact number as typed, such as ``8/3`` or ``20 deg``, if its double differs."""
         exact = {n: self.written.get(n, {}).get(x) for n, x in parameters.items()}
         return {n: text for n, text in exact.items() if text}
 
-    def as_nodes(self, parameters: Mapping[str, float]) -> dict[str, Node]:
+    def as_nodes(self, parameters: Numbers) -> dict[str, Node]:
         """Parameters exactly as typed, as nodes of formulas."""
         typed = self.typed(parameters)
         return {n: number(x, typed.get(n, "")) for n, x in parameters.items()}
 
-    def exactly(self, parameters: Mapping[str, float]) -> dict[str, Any]:
+    def exactly(self, parameters: Numbers) -> dict[str, Any]:
         """Parameters exactly as typed, as fractions or balls of the working precision."""
         return {n: fold(formula([x]), {}, BALLS)[0] for n, x in self.as_nodes(parameters).items()}
 
-    def ordered(self, values: Mapping[str, Any]) -> dict[str, Any]:
+    def ordered(self, values: AnyNumbers) -> dict[str, Any]:
         """Every parameter in the model's order: the given values and the fixed ones."""
         complete = {**self.fixed, **values}
         return {name: complete[name] for name in self.parameter_set.names}
@@ -266,7 +264,7 @@ def _field_values(record: _Fields) -> dict[str, Any]:
     return {f.name: getattr(record, f.name) for f in fields(record)}
 
 
-def radius_parameters(of: ParameterSet, weights: Mapping[str, float], fixed: Mapping[str, float]) -> tuple[str, ...]:
+def radius_parameters(of: ParameterSet, weights: Numbers, fixed: Numbers) -> tuple[str, ...]:
     """Parameters that change in the robustness radius; by default all that `Parameter.may_change` allows.
 
     Args:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -11,7 +11,7 @@ import flint
 import numpy as np
 
 from tmsopt.models import Model, ParameterSet, Quantity, Values
-from tmsopt.records import Array
+from tmsopt.records import AnyNumbers, Array
 from tmsopt.roots import Root, Structure, exact_roots, structure
 
 STRUCTURE_TOLERANCE = 1e-11
@@ -40,14 +40,15 @@ def _may_have_huge_roots(a: Array) -> Any:
     return ends
 
 
-def _structure(values: Mapping[str, Any]) -> Structure:
+def _structure(values: AnyNumbers) -> Structure:
     assert isinstance(values, Values)
     a = [float(c) for c in values.coefficients]
+    undecided = Structure("undecided", (), math.inf)
     if not all(map(math.isfinite, a)) or _may_have_huge_roots(np.array(a)):
-        return Structure("undecided", (), math.inf)  # a singular mass matrix: a root at infinity
+        return undecided  # a singular mass matrix: a root at infinity
     off = values.roundings()
     if abs(a[0]) <= off[0] < math.inf:
-        return Structure("undecided", (), math.inf)  # a0 may be 0 within rounding
+        return undecided  # a0 may be 0 within rounding
     found = _cached_structure(tuple(a), tuple(map(float, off)))
     simple = found.name in SIMPLE and all(root.multiplicity == 1 for root in found.roots)
     if simple and _scatter(np.array(a), found) > _SCATTER:
@@ -67,7 +68,7 @@ def _cached_structure(a: tuple[float, ...], off: tuple[float, ...]) -> Structure
     return structure(a, STRUCTURE_TOLERANCE, off)
 
 
-def roots_at(model: Model, of: ParameterSet, parameters: Mapping[str, Any]) -> tuple[Root, ...]:
+def roots_at(model: Model, of: ParameterSet, parameters: AnyNumbers) -> tuple[Root, ...]:
     """Exact roots of the parameters as stored, rightmost first; none if a coefficient is undefined.
 
     Coefficients have 120 digits, and roots are isolated in ball arithmetic.
@@ -83,16 +84,12 @@ def roots_at(model: Model, of: ParameterSet, parameters: Mapping[str, Any]) -> t
     return exact_roots(coefficients[leading:])
 
 
-def _damping_ratio(values: Mapping[str, Any]) -> float:
+def _damping_ratio(values: AnyNumbers) -> float:
     if isinstance(values, Values) and values.model.carrier is not None:
         return math.nan  # a complex system has no fixed zero of frequency
     roots = values["structure"].roots
     ratios = (-r.re / r.size if r.re or r.im else 0.0 for r in roots)
     return min(ratios, default=math.nan)
-
-
-def _angular_frequency(values: Mapping[str, Any]) -> float:
-    return max((abs(r.im) for r in values["structure"].roots), default=math.nan)
 
 
 ANGULAR_FREQUENCY = "angular_frequency"
@@ -101,7 +98,13 @@ ANGULAR_FREQUENCY = "angular_frequency"
 ROOT_QUANTITIES = (
     Quantity("abscissa", "1", "largest real part of the roots", r"\alpha", lambda v: float(v["structure"].abscissa)),
     Quantity("damping_ratio", "1", "least −Re s/|s| over the roots", r"\zeta", _damping_ratio),
-    Quantity(ANGULAR_FREQUENCY, "1", "greatest |Im s| over the roots", r"\omega", _angular_frequency),
+    Quantity(
+        ANGULAR_FREQUENCY,
+        "1",
+        "greatest |Im s| over the roots",
+        r"\omega",
+        lambda v: max((abs(r.im) for r in v["structure"].roots), default=math.nan),
+    ),
 )
 """Root quantities, each the worst over the cases of a problem."""
 
@@ -140,7 +143,7 @@ def regularise(coefficients: Array) -> Array:
 
 
 def lifted_quantities(
-    model: Model, of: ParameterSet, parameters: Mapping[str, Any], expressions: Iterable[Callable[[Values], Any]]
+    model: Model, of: ParameterSet, parameters: AnyNumbers, expressions: Iterable[Callable[[Values], Any]]
 ) -> tuple[Quantity, ...]:
     """The quantities in expressions that are defined by an equation; proofs treat these as unknowns."""
     found: dict[str, Quantity] = {}

@@ -30,6 +30,8 @@ class Section(BaseModel):
 
 S = TypeVar("S", bound=Section)
 Key = tuple[str, ...]
+Tables = Mapping[str, Any]
+"""The tables of a file, or a table."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Page:
     """
 
     file: str
-    data: Mapping[str, Any]
+    data: Tables
     lines: Mapping[Key, int]
 
     def error(self, faults: Iterable[Fault]) -> InputError:
@@ -52,10 +54,7 @@ class Page:
 
     def _line_of(self, key: Key) -> int:
         """Line of the longest prefix of a key path that the file has; 1 if it has none."""
-        for end in range(len(key), 0, -1):
-            if key[:end] in self.lines:
-                return self.lines[key[:end]]
-        return 1
+        return next((self.lines[key[:end]] for end in range(len(key), 0, -1) if key[:end] in self.lines), 1)
 
 
 def read_page(path: str | PathLike[str], kind: str) -> Page:
@@ -81,7 +80,7 @@ def read_page(path: str | PathLike[str], kind: str) -> Page:
 
 
 def validate_tables(
-    data: Mapping[str, Any], schema: type[S], explain: Callable[[tuple[int | str, ...], str, Any], Fault]
+    data: Tables, schema: type[S], explain: Callable[[tuple[int | str, ...], str, Any], Fault]
 ) -> tuple[list[Fault], S | None]:
     """Faults of shape, and the data without the faulty keys.
 
@@ -108,7 +107,7 @@ def validate_tables(
     return list(faults.values()), None
 
 
-def _drop_keys(data: Mapping[str, Any], keys: set[Key]) -> dict[str, Any]:
+def _drop_keys(data: Tables, keys: set[Key]) -> dict[str, Any]:
     inner = {n: {k: v for k, v in t.items() if (n, k) not in keys} for n, t in data.items() if isinstance(t, dict)}
     plain = {n for n, *rest in keys if not rest or n not in inner}
     return {n: inner.get(n, value) for n, value in data.items() if n not in plain}

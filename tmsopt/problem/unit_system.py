@@ -14,6 +14,7 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.problem.units import Dimension, dimension, unit_factor
 from tmsopt.problem.validate import SMALLEST
+from tmsopt.records import AnyNumbers, Numbers
 
 _PER_SECOND = "1/s"
 _FREQUENCY, _HERTZ = "frequency", "Hz"  # shown in Hz, not in 1/s
@@ -61,16 +62,13 @@ def unit_of(problem: Posed, text: str) -> Unit:
     name = text.strip().removesuffix(".min").removesuffix(".max").removesuffix(".limit")
     if name in problem.parameter_set.names:
         return _make_unit(problem.units.get(name, ""), units[name])
-    if units.get(_FREQUENCY) == _HERTZ and set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name))) == {
-        _FREQUENCY
-    }:
+    used = set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name)))
+    if units.get(_FREQUENCY) == _HERTZ and used == {_FREQUENCY}:
         return Unit(_HERTZ)
-    if name in units:
-        return _usual_unit(problem, Dimension.of(units[name]))
-    return _usual_unit(problem, dimension_of(problem, text, units))
+    return _usual_unit(problem, Dimension.of(units[name]) if name in units else dimension_of(problem, text, units))
 
 
-def rate_of(problem: Posed, text: str, parameters: Mapping[str, Any]) -> Any:
+def rate_of(problem: Posed, text: str, parameters: AnyNumbers) -> Any:
     """The factor from √(g/w) to 1/s for an expression with that unit; None for other units or without seconds.
 
     Args:
@@ -82,13 +80,13 @@ def rate_of(problem: Posed, text: str, parameters: Mapping[str, Any]) -> Any:
     return of.rate(parameters)
 
 
-def unit_at(problem: Posed, text: str, parameters: Mapping[str, float]) -> Unit:
+def unit_at(problem: Posed, text: str, parameters: Numbers) -> Unit:
     """The unit to show an expression in at a design: rates in 1/s if the parameters define seconds."""
     rate = rate_of(problem, text, parameters)
     return unit_of(problem, text) if rate is None else Unit(_PER_SECOND, 1 / float(rate))
 
 
-def common_unit(problem: Posed, text: str, common: Mapping[str, float] | None = None) -> Unit:
+def common_unit(problem: Posed, text: str, common: Numbers | None = None) -> Unit:
     """The unit of `unit_at` if it is the same at all designs, for bounds and differences; else that of `unit_of`.
 
     Args:
@@ -102,7 +100,7 @@ def common_unit(problem: Posed, text: str, common: Mapping[str, float] | None = 
         return unit_of(problem, text)
 
 
-def show_at(problem: Posed, text: str, parameters: Mapping[str, float], value: float, digits: int = 5) -> str:
+def show_at(problem: Posed, text: str, parameters: Numbers, value: float, digits: int = 5) -> str:
     """A number in the unit of `unit_at`, followed by its own unit in parentheses if that differs."""
     shown, own = unit_at(problem, text, parameters), unit_of(problem, text)
     behind = f" ({own.show(value, digits)})" if shown != own and math.isfinite(value) else ""
@@ -119,7 +117,7 @@ def si_units(problem: Posed) -> dict[str, str]:
     return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
 
 
-def amounts_text(problem: Posed, amounts: Mapping[str, float]) -> str:
+def amounts_text(problem: Posed, amounts: Numbers) -> str:
     """The violation of each limit, in the units of the problem."""
     return ", ".join(f"{name} by {unit_of(problem, name).show(amount, 3)}" for name, amount in amounts.items())
 
@@ -127,14 +125,14 @@ def amounts_text(problem: Posed, amounts: Mapping[str, float]) -> str:
 def limit_text(problem: Posed, name: str) -> str:
     """A limit with its number in the unit of the problem; empty if there is no such limit."""
     unit = unit_of(problem, name)
-    if name not in problem.constraints:
-        parameter, _, end = name.rpartition(".")
-        if parameter not in problem.free or end not in ("min", "max"):
-            return ""
-        return f"{'>=' if end == 'min' else '<='} {unit.show(problem.free[parameter][end == 'max'], 6)}"
-    text = problem.constraints[name]
-    limit = split_limit(text)
-    return limit.replace_number(unit.show(limit.value, 9)) if limit and unit.text else text
+    text = problem.constraints.get(name)
+    if text is not None:
+        limit = split_limit(text)
+        return limit.replace_number(unit.show(limit.value, 9)) if limit and unit.text else text
+    parameter, _, end = name.rpartition(".")
+    if parameter not in problem.free or end not in ("min", "max"):
+        return ""
+    return f"{'>=' if end == 'min' else '<='} {unit.show(problem.free[parameter][end == 'max'], 6)}"
 
 
 def units_of(problem: Posed, texts: Iterable[str] = ()) -> dict[str, str]:
@@ -144,11 +142,9 @@ def units_of(problem: Posed, texts: Iterable[str] = ()) -> dict[str, str]:
         texts: further expressions, in addition to parameters, quantities and constraints.
     """
     units = si_units(problem)
-    asked = {
-        text: dimension_of(problem, text, units).unit
-        for text in (*problem.constraints, *(t for t in texts if t not in units))
-    }
-    return {name: unit for name, unit in {**units, **asked}.items() if unit != "1"}
+    texts = (*problem.constraints, *(t for t in texts if t not in units))
+    units |= {text: dimension_of(problem, text, units).unit for text in texts}
+    return {name: unit for name, unit in units.items() if unit != "1"}
 
 
 def dimension_of(problem: Posed, text: str, units: Mapping[str, str] | None = None) -> Dimension:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 from tmsopt.errors import Fault, limit_advice, short, suggest, table_faults, text_faults
@@ -12,6 +13,7 @@ from tmsopt.models.user_spectrum import pattern_of, patterns_of, public_names
 from tmsopt.problem.advice.names import example_of, suggest_name
 from tmsopt.problem.cases import Band, points_of
 from tmsopt.problem.quantities import expand_names, root_names
+from tmsopt.records import AnyNumbers
 
 VARIATIONS = ("scenarios", "tolerances", "weights")
 """Tables of a problem that name parameters, in addition to `fixed` and `free`."""
@@ -29,11 +31,6 @@ _LONGEST = 200  # characters of the name of a pattern
 
 Stated = Any
 """A problem as stated; any field may have any type."""
-
-
-def guess_parameter_set(model: Model, names: Mapping[str, Any]) -> ParameterSet:
-    """The parameter set with most of the names; the native one in case of a tie."""
-    return max(model.sets, key=lambda s: len(names.keys() & set(s.names)))
 
 
 _TABLES = {
@@ -72,34 +69,26 @@ def _size_faults(what: str, values: Any, *key: str) -> Iterator[Fault]:
         yield Fault(f"found {len(values)}; accepted: up to {MOST_ENTRIES[what]}", key)
 
 
-def find_faults(problem: Stated) -> Iterator[Fault]:
-    """Every fault of a problem whose arguments have the right types."""
-    names = {**problem.fixed, **problem.free, **problem.scenarios}
-    of = guess_parameter_set(problem.model, names)
-    yield from _name_faults(problem, of)
-    for name in of.names:
-        yield from _value_faults(problem, of, name)
-    yield from _need_faults(problem, of)
-    yield from _variation_faults(problem, of)
-    yield from _objective_faults(problem)
-    yield from _expression_faults(problem, of)
+def find_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+    """Every fault of a problem in a parameter set, whose arguments have the right types."""
+    checks = (_name_faults, _value_faults, _need_faults, _variation_faults, _objective_faults, _expression_faults)
+    return chain.from_iterable(check(problem, of) for check in checks)
 
 
 def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     others = {n: s.name for s in problem.model.sets if s is not of for n in s.names}
     advice = limit_advice(suggest_name)
     tables = {"parameters": {**problem.fixed, **problem.free}} | {t: getattr(problem, t) for t in VARIATIONS}
-    for table, name in ((t, n) for t, names in tables.items() for n in names):
-        if name in of.names:
-            continue
+    for table, name in ((t, n) for t, names in tables.items() for n in names if n not in of.names):
+        message = f"unknown parameter {short(name)}; "
         if name in others:
-            yield Fault(
+            message = (
                 f"{others[name]} parameter '{name}' among {of.name} ones; do not mix the two sets: "
-                f"write all parameters in one ({' '.join(of.names)})",
-                (table, name),
+                f"write all parameters in one ({' '.join(of.names)})"
             )
         else:
-            yield Fault(f"unknown parameter {short(name)}; {advice(name, problem.model, of, of.names)}", (table, name))
+            message += advice(name, problem.model, of, of.names)
+        yield Fault(message, (table, name))
     for name in problem.fixed:
         if name in problem.free:
             yield Fault(f"'{name}' is both fixed and free; keep one", ("parameters", name))
@@ -113,30 +102,33 @@ def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
             yield Fault(f"found a start for '{name}'; accepted: free parameters", ("parameters", name, "start"))
 
 
-def _value_faults(problem: Stated, of: ParameterSet, name: str) -> Iterator[Fault]:
-    key = ("parameters", name)
-    if name in problem.fixed:
-        yield from _number_faults(of, name, problem.fixed[name], key)
-    if name not in problem.free:
-        return
-    try:
-        lower, upper = problem.free[name]
-    except (TypeError, ValueError):
-        yield Fault(f"found {short(problem.free[name])}; accepted: a pair (least, greatest)", key)
-        return
-    ends = {"min": lower, "max": upper}
-    if name in problem.start:
-        ends["start"] = problem.start[name]
-    found = [f for end, value in ends.items() for f in _number_faults(of, name, value, (*key, end))]
-    yield from found
-    if found:
-        return
-    if lower > upper:
-        yield Fault(f"min = {lower:.6g} is greater than max = {upper:.6g}; swap them", key)
-    elif name in problem.start and not lower <= problem.start[name] <= upper:
-        yield Fault(
-            f"start = {problem.start[name]:.6g} lies outside the bounds {lower:.6g} … {upper:.6g}", (*key, "start")
-        )
+def _value_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+    for name in of.names:
+        key = ("parameters", name)
+        if name in problem.fixed:
+            yield from _number_faults(of, name, problem.fixed[name], *key)
+        if name in problem.free:
+            try:
+                lower, upper = problem.free[name]
+            except (TypeError, ValueError):
+                yield Fault(f"found {short(problem.free[name])}; accepted: a pair (least, greatest)", key)
+                continue
+            start = {"start": problem.start[name]} if name in problem.start else {}
+            found = _ends_faults(of, name, {"min": lower, "max": upper, **start}, *key)
+            yield from found
+            if start and not found and not lower <= start["start"] <= upper:
+                message = f"start = {start['start']:.6g} lies outside the bounds {lower:.6g} … {upper:.6g}"
+                yield Fault(message, (*key, "start"))
+
+
+def _ends_faults(of: ParameterSet, name: str, ends: AnyNumbers, *key: str) -> list[Fault]:
+    """Faults of the ends of a range and of a start in it; the ends of a band differ."""
+    found = [f for end, value in ends.items() for f in _number_faults(of, name, value, *key, end)]
+    lower, upper = ends["min"], ends["max"]
+    if not found and (lower > upper or (lower == upper and key[0] == "scenarios")):
+        order = "greater than" if lower > upper else "not less than"
+        found = [Fault(f"min = {lower:.6g} is {order} max = {upper:.6g}; swap them", key)]
+    return found
 
 
 def _need_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
@@ -164,13 +156,13 @@ def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
         for name, value in getattr(problem, table).items():
             if name not in of.names:
                 continue
-            if not _has_usable_size(size := _number(value)) or size < 0 or (size == 0 and table == "tolerances"):
+            size = _number(value)
+            if not _has_usable_size(size) or size < 0 or (size == 0 and table == "tolerances"):
                 sizes = f"a number {needed}, of a size from {SMALLEST:g} to {1 / SMALLEST:g}"
                 yield Fault(f"found {short(value)}; accepted: {sizes}", (table, name))
             elif table == "tolerances":
                 yield from _tolerance_faults(problem, of, name, size)
-    if len(problem.tolerances) > MOST_TOLERANCES:
-        found = len(problem.tolerances)
+    if (found := len(problem.tolerances)) > MOST_TOLERANCES:
         message = f"found {found} tolerances; accepted: up to {MOST_TOLERANCES}; keep those that matter most"
         yield Fault(message, ("tolerances",))
 
@@ -180,17 +172,14 @@ def _scenario_faults(problem: Stated, of: ParameterSet, name: str, scenario: Any
     if name in problem.free:
         yield Fault(f"'{name}' is both free and in scenarios; keep one", key)
     if isinstance(scenario, Band):
-        found = [f for end in ("min", "max") for f in _number_faults(of, name, getattr(scenario, end), (*key, end))]
-        yield from found
-        if not found and scenario.min >= scenario.max:
-            yield Fault(f"min = {scenario.min:.6g} is not less than max = {scenario.max:.6g}", key)
+        yield from _ends_faults(of, name, {"min": scenario.min, "max": scenario.max}, *key)
         if isinstance(scenario.points, bool) or not isinstance(scenario.points, int) or not 2 <= scenario.points <= 99:
             yield Fault(f"points = {short(scenario.points)}; accepted: a whole number from 2 to 99", (*key, "points"))
     elif not isinstance(scenario, Sequence) or isinstance(scenario, str) or not scenario:
         yield Fault(f"found {short(scenario)}; accepted: {{ min = …, max = …, points = … }}, or a list of values", key)
     else:
         for value in scenario:
-            yield from _number_faults(of, name, value, key)
+            yield from _number_faults(of, name, value, *key)
 
 
 def _tolerance_faults(problem: Stated, of: ParameterSet, name: str, tolerance: float) -> Iterator[Fault]:
@@ -218,49 +207,52 @@ def _has_usable_size(number: float) -> bool:
     return number == 0 or SMALLEST <= abs(number) <= 1 / SMALLEST
 
 
-def _number_faults(of: ParameterSet, name: str, value: Any, key: tuple[str, ...]) -> Iterator[Fault]:
-    parameter = of[name]
+def _number_faults(of: ParameterSet, name: str, value: Any, *key: str) -> Iterator[Fault]:
+    parameter, number = of[name], _number(value)
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-    number = _number(value)
     if not math.isfinite(number):
         yield Fault(f"found {short(value)}; accepted: a finite number{unit and ' in' + unit}", key)
     elif not _has_usable_size(number):
         yield Fault(f"found {number:g}; accepted: 0, or a size from {SMALLEST:g} to {1 / SMALLEST:g}{unit}", key)
     elif number not in parameter.range:
-        degrees = f'; write "{number:.6g} deg" for degrees' if parameter.unit == "rad" and abs(number) < 90 else ""
-        down = -number in parameter.range and parameter.meaning.endswith("downward")
-        degrees = f"; z points down: write {-number:.6g}{unit} for what is above the ground" if down else degrees
-        found = f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}{degrees}"
+        hint = f'; write "{number:.6g} deg" for degrees' if parameter.unit == "rad" and abs(number) < 90 else ""
+        if -number in parameter.range and parameter.meaning.endswith("downward"):
+            hint = f"; z points down: write {-number:.6g}{unit} for what is above the ground"
+        found = f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}{hint}"
         yield Fault(found, key)
 
 
-def _objective_faults(problem: Stated) -> Iterator[Fault]:
+def _objective_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
     key = ("objective",)
     asked = [sense for sense in ("minimize", "maximize") if getattr(problem, sense) is not None]
     if len(asked) > 1:
         yield Fault("found both minimize and maximize; keep one of them", key)
     if problem.pareto and asked:
         yield Fault(f"found both pareto and {asked[0]}; keep one of them", key)
-    texts = problem.pareto
-    listed = isinstance(texts, Sequence) and not isinstance(texts, str)
-    if not listed or len(texts) not in (0, 2, 3) or len({str(t).strip() for t in texts}) < len(texts):
+    texts = _list_pareto(problem)
+    if texts is None or len(texts) not in (0, 2, 3) or len({str(t).strip() for t in texts}) < len(texts):
         accepted = "two or three different expressions to minimise, such as ['abscissa', 'Fr', '-lambda_s']"
-        message = f"found {short(texts)}; accepted: {accepted}, where a minus sign maximises"
+        message = f"found {short(problem.pareto)}; accepted: {accepted}, where a minus sign maximises"
         yield Fault(message, ("objective", "pareto"))
     if problem.locate is not None:
-        yield from pattern_faults(problem.locate, problem.model, (*key, "locate"))
+        yield from _pattern_faults(problem.locate, problem.model, (*key, "locate"))
 
 
-def pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fault]:
-    """Faults of the name of a pattern for the polynomials of a model."""
+def _list_pareto(problem: Stated) -> Sequence[Any] | None:
+    """The expressions of a front; None if they are no list."""
+    texts = problem.pareto
+    return texts if isinstance(texts, Sequence) and not isinstance(texts, str) else None
+
+
+def _pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fault]:
     try:
         if not isinstance(name, str) or len(name) > _LONGEST:
             raise ValueError(f"{short(name)} is no pattern")
         known = dict(zip(model.words, ("weave", "capsize"), strict=True)).get(name, name)
         if known != name and known in patterns_of(model):
             yield Fault(f"unknown pattern: '{name}' is {known} in data; write {known}", key)
-            return
-        pattern_of(model, name)
+        else:
+            pattern_of(model, name)
     except ValueError as error:
         joined = ", or several, joined by +" if model.degree > 4 else ""
         yield Fault(f"unknown pattern: {error}; {suggest(str(name), patterns_of(model))}{joined}", key)
@@ -279,10 +271,8 @@ def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
         except ExpressionError as error:
             yield Fault(str(error), key)
 
-    pareto = problem.pareto if isinstance(problem.pareto, Sequence) and not isinstance(problem.pareto, str) else ()
-    for sense, texts in (("minimize", [problem.minimize]), ("maximize", [problem.maximize]), ("pareto", pareto)):
-        for text in texts:
-            if text is not None or sense == "pareto":
-                yield from parse_faults(parse_value, text, "objective", sense)
+    texts = {"minimize": [problem.minimize], "maximize": [problem.maximize], "pareto": _list_pareto(problem) or ()}
+    for sense, text in ((s, t) for s, listed in texts.items() for t in listed if t is not None or s == "pareto"):
+        yield from parse_faults(parse_value, text, "objective", sense)
     for name, text in problem.constraints.items():
         yield from parse_faults(parse_comparison, text, "constraints", name)

@@ -1,13 +1,13 @@
 """Formulas that all bicycle models share."""
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from tmsopt.algebra.kinds import choose, less, quotient, sqrt, tan
 from tmsopt.models.bicycles.tables import quantities
 from tmsopt.models.model import NumberFunction, Quantity
 from tmsopt.models.tables import read_table
+from tmsopt.records import AnyNumbers
 
 WORDS = "weave", "capsize"
 """Names for instability by a pair on the imaginary axis, and by a root 0."""
@@ -15,12 +15,12 @@ WORDS = "weave", "capsize"
 _TINY = 1e-300  # avoids 0/0 where all masses lie on the ground line; negligible elsewhere
 
 
-def omega0(v: Mapping[str, Any]) -> Any:
+def omega0(v: AnyNumbers) -> Any:
     """−(a4/a0)^(1/4), minus the geometric mean of the roots."""
     return -sqrt(sqrt(quotient(v["a4"], v["a0"])))
 
 
-def omega0_equation(v: Mapping[str, Any], x: Any) -> Any:
+def omega0_equation(v: AnyNumbers, x: Any) -> Any:
     """0 exactly if x is ω0, within its range."""
     return x * x * x * x * v["a0"] - v["a4"]
 
@@ -35,7 +35,7 @@ def smaller_eigenvalue(first: Any, mixed: Any, second: Any, determinant: Any) ->
     return 2 * determinant / (first + second + apart + _TINY)
 
 
-def contact_path(p: Mapping[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
+def contact_path(p: AnyNumbers) -> tuple[Any, Any, Any, Any, Any]:
     """Coefficients e, f, v, w, −c cos λ_s of the paths of the contacts, without lateral slip.
 
     ψ′ = e δ + f δ′ = (v δ + c δ′) cos λ_s/w; to the right y_rear′ = v ψ, y_front = y_rear + w ψ − c cos λ_s δ. In
@@ -53,7 +53,7 @@ def times(rate: NumberFunction, expression: str) -> tuple[Quantity, ...]:
         rate, expression: a rate of 1 in 1/s, as a function and as an expression.
     """
 
-    def decay_time(v: Mapping[str, Any]) -> Any:
+    def decay_time(v: AnyNumbers) -> Any:
         abscissa = v["abscissa"]
         return choose(less(abscissa, 0), quotient(1, -abscissa * rate(v)), math.nan)
 

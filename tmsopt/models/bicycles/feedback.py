@@ -4,12 +4,24 @@ M q″ + D q′ + K q = −G (φ, δ, φ′, δ′), q = (lean, steer), so the g
 lag T′ + T = −G (…), and the row of each torque is multiplied by lag s + 1.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from operator import add
 from typing import Any, NamedTuple
 
 from tmsopt.algebra.kinds import absolute, pi, quotient, sqrt
-from tmsopt.models.model import Feedback, Matrix, Model, NumberFunction, Parameter, ParameterSet, Quantity, Range
+from tmsopt.models.model import (
+    Feedback,
+    Matrices,
+    Matrix,
+    Model,
+    NumberFunction,
+    Parameter,
+    ParameterSet,
+    Quantity,
+    Range,
+)
+from tmsopt.records import AnyNumbers
 from tmsopt.roots.polynomial import determinant
 
 LAG = "lag"
@@ -20,18 +32,19 @@ _TORQUES = {
 }  # in the order of the rows of M, D, K
 _STATE_ORDER = ("phi", "phidot", "delta", "deltadot")
 _STEER = tuple(f"k_{x}" for x in _STATE_ORDER)
-_SLOPE = "_v"  # suffix of gains that are multiplied by the speed
 
 
 class _Gain(NamedTuple):
+    """A gain of a torque against a state, multiplied by the speed if it is a slope."""
+
     torque: str
     state: str
-    slope: str
-    """`_SLOPE` if the gain is multiplied by the speed, else empty."""
+    slope: bool
 
     @property
-    def row(self) -> int:
-        return list(_TORQUES).index(self.torque)
+    def place(self) -> tuple[int, int]:
+        """Row and column in G."""
+        return list(_TORQUES).index(self.torque), list(_STATES).index(self.state)
 
     @property
     def is_rate(self) -> bool:
@@ -39,8 +52,8 @@ class _Gain(NamedTuple):
 
 
 _GAINS = {
-    f"{torque}_{x}{slope}": _Gain(torque, x, slope)
-    for slope in ("", _SLOPE)
+    f"{torque}_{x}{'_v' * slope}": _Gain(torque, x, slope)
+    for slope in (False, True)
     for torque in ("k", "lean")
     for x in _STATE_ORDER
 }
@@ -77,8 +90,8 @@ class ControllableBicycle:
     """
 
     model: Model
-    matrices: Callable[[Mapping[str, Any]], tuple[Matrix, Matrix, Matrix]]
-    unit: Callable[[Mapping[str, Any], Any], tuple[Any, Any]]
+    matrices: Callable[[AnyNumbers], Matrices]
+    unit: Callable[[AnyNumbers, Any], tuple[Any, Any]]
     speed: str
 
 
@@ -87,7 +100,7 @@ def native_name(name: str) -> str:
     return "tau" if name == LAG else f"kappa_{name.removeprefix('k_')}"
 
 
-def si_scale(name: str, p: Mapping[str, Any], rate: NumberFunction, torque: NumberFunction) -> Any:
+def si_scale(name: str, p: AnyNumbers, rate: NumberFunction, torque: NumberFunction) -> Any:
     """SI value of a parameter of [feedback] whose dimensionless value is 1."""
     if name == LAG:
         return 1 / rate(p)
@@ -106,53 +119,50 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
     """The bicycle with a controller that has the parameters `names`, from `feedback_names`."""
     base, has_lag = bicycle.model, LAG in names
     listed = {n: _GAINS[n] for n in names if n != LAG}
-    driven = tuple(sorted({gain.row for gain in listed.values()}))
+    places = {gain.place for gain in listed.values()}
+    driven = tuple(sorted({row for row, _ in places}))
     in_si = base.sets[0].rate is not None  # the native set
 
     def native(name: str) -> str:
         return name if in_si else native_name(name)
 
-    def gains(p: Mapping[str, Any]) -> dict[tuple[int, str], Any]:
-        """Row and state → gain, from native parameters."""
-        found: dict[tuple[int, str], Any] = {}
+    def gains(p: AnyNumbers) -> Matrix:
+        """G from native parameters."""
+        G: Matrix = [[0] * len(_STATES) for _ in _TORQUES]
         for n, gain in listed.items():
-            key, term = (gain.row, gain.state), p[native(n)] * p[bicycle.speed] if gain.slope else p[native(n)]
-            found[key] = found[key] + term if key in found else term
-        return found
+            i, j = gain.place
+            G[i][j] = G[i][j] + (p[native(n)] * p[bicycle.speed] if gain.slope else p[native(n)])
+        return G
 
-    def algebraic(p: Mapping[str, Any]) -> dict[str, Any]:
-        plain = base.algebraic(p)
-        own = {f"G_{row}_{x}": gain for (row, x), gain in gains(p).items()}
+    def algebraic(p: AnyNumbers) -> dict[str, Any]:
+        plain, G = base.algebraic(p), gains(p)
+        own = {f"G_{i}_{j}": G[i][j] for i, j in places}
         return {**plain, **own, "h": sqrt(1 + plain["T"] * plain["T"])} | ({LAG: p[native(LAG)]} if has_lag else {})
 
     def polynomial(**values: Any) -> list[Any]:
-        M, D, K = bicycle.matrices(values)
+        matrices = bicycle.matrices(values)
         angle, square = bicycle.unit(values, values["h"])
         unit = ((1, angle), (angle, square))
-        rows = [[[M[i][j], D[i][j], K[i][j]] for j in (0, 1)] for i in (0, 1)]
+        rows = [[[P[i][j] for P in matrices] for j in (0, 1)] for i in (0, 1)]
         for i in driven if has_lag else ():
             rows[i] = [_multiply_by_lag(values[LAG], entry) for entry in rows[i]]
-        for i, x in {(gain.row, gain.state) for gain in listed.values()}:
-            j, power = int("delta" in x), -2 if "dot" in x else -1
-            rows[i][j][power] = rows[i][j][power] + values[f"G_{i}_{x}"] * unit[i][j]
+        for i, j in places:
+            entry, power = rows[i][j % 2], -1 - j // 2
+            entry[power] = entry[power] + values[f"G_{i}_{j}"] * unit[i][j % 2]
         return determinant(rows)
 
-    def feedback(p: Mapping[str, Any]) -> Feedback:
-        by_place = gains(p)
+    def feedback(p: AnyNumbers) -> Feedback:
         assert base.pencil is not None
-        G = [[by_place.get((row, x), 0) for x in _STATES] for row in (0, 1)]
-        return Feedback(base.pencil(p)[0], G, p[native(LAG)] if has_lag else None, driven)
+        return Feedback(base.pencil(p)[0], gains(p), p[native(LAG)] if has_lag else None, driven)
 
-    def pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
+    def pencil(p: AnyNumbers) -> Matrices:
         assert base.pencil is not None
         M, D, K = base.pencil(p)
-        G = feedback(p).gains
+        G = gains(p)
         if has_lag:
             return _first_order(M, D, K, G, p[native(LAG)], driven)
-        D, K = (
-            [[row[j] + g[j + first] for j in (0, 1)] for row, g in zip(B, G, strict=True)]
-            for B, first in ((D, 2), (K, 0))
-        )
+        D = [list(map(add, row, g[2:])) for row, g in zip(D, G, strict=True)]
+        K = [list(map(add, row, g)) for row, g in zip(K, G, strict=True)]
         return M, D, K
 
     sets = tuple(_extend_set(s, names, native, feedback) for s in base.sets)
@@ -183,7 +193,7 @@ def _multiply_by_lag(lag: Any, entry: list[Any]) -> list[Any]:
     return [lag * a, a + lag * b, b + lag * c, c]
 
 
-def _first_order(M: Matrix, D: Matrix, K: Matrix, G: Matrix, lag: Any, driven: tuple[int, ...]) -> tuple[Matrix, ...]:
+def _first_order(M: Matrix, D: Matrix, K: Matrix, G: Matrix, lag: Any, driven: tuple[int, ...]) -> Matrices:
     """I and −A for the states φ, δ, φ′, δ′ and the lagging torques."""
     (a, b), (c, d) = M
     size = a * d - b * c
@@ -210,7 +220,7 @@ def _extend_set(
     to_native, rate, torque = base.native, base.rate, base.torque
     assert torque is not None
 
-    def to_native_with_gains(p: Mapping[str, Any]) -> dict[str, Any]:
+    def to_native_with_gains(p: AnyNumbers) -> dict[str, Any]:
         own = {native(n): p[n] if native(n) == n else p[n] / si_scale(n, p, rate, torque) for n in names}
         return {**to_native(p), **own}
 
@@ -218,7 +228,7 @@ def _extend_set(
     quantities = tuple(q for q in base.quantities if q.name not in _PASSIVE)
     every = (*base.parameters, *own)
 
-    def torques(v: Mapping[str, Any]) -> Feedback:
+    def torques(v: AnyNumbers) -> Feedback:
         return feedback(to_native_with_gains({p.name: v[p.name] for p in every}))
 
     quantities += tuple(_quantities(names, torques, rate))
@@ -247,11 +257,11 @@ def _parameter(name: str, unit: str, public_name: str) -> Parameter:
 def _quantities(names: tuple[str, ...], torques: Callable[..., Feedback], rate: NumberFunction) -> Iterator[Quantity]:
     """Torques that the controller must provide, in SI."""
 
-    def per_degree(v: Mapping[str, Any]) -> Any:
+    def per_degree(v: AnyNumbers) -> Any:
         gain = v["k_phi"] + (v["k_phi_v"] * v["v"] if "k_phi_v" in names else 0)
         return gain * pi(gain) / 180
 
-    def torque_after_push(v: Mapping[str, Any]) -> Any:
+    def torque_after_push(v: AnyNumbers) -> Any:
         """Torque per impulse: the rates jump by M⁻¹ (0, 1)."""
         found = torques(v)
         (a, b), (c, d) = found.mass

@@ -7,7 +7,7 @@ from typing import Any
 from tmsopt.algebra.kinds import positive_part
 from tmsopt.models.expression import parse_value
 from tmsopt.models.model import Parameter, Quantity, Range
-from tmsopt.records import Table
+from tmsopt.records import AnyNumbers, Table
 
 _RANGES = {
     "": Range(),
@@ -22,13 +22,13 @@ LAMBDA_S = Parameter(
 )
 
 
-def parameters(rows: Mapping[str, Any]) -> tuple[Parameter, ...]:
+def parameters(rows: AnyNumbers) -> tuple[Parameter, ...]:
     """Parameters by name, each with the fields of `Parameter`; `latex` is the name by default."""
     return tuple(Parameter(name, **_fields(name, row)) if row else LAMBDA_S for name, row in rows.items())
 
 
 def quantities(
-    rows: Mapping[str, Any],
+    rows: AnyNumbers,
     computed: Mapping[str, dict[str, Any]] = Table(),
     counterparts: Mapping[str, Quantity] = Table(),
 ) -> tuple[Quantity, ...]:
@@ -51,7 +51,7 @@ def quantities(
     return tuple(found)
 
 
-def _fields(name: str, row: Mapping[str, Any]) -> dict[str, Any]:
+def _fields(name: str, row: AnyNumbers) -> dict[str, Any]:
     return {"latex": name, **row, "range": _RANGES[row.get("range", "")]}
 
 

@@ -1,6 +1,5 @@
 """The two-mass-skate bicycle (Kirillov 2018; Kooijman et al. 2011), dimensionless and in SI."""
 
-from collections.abc import Mapping
 from pkgutil import resolve_name
 from typing import Any
 
@@ -11,8 +10,9 @@ from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS
 from tmsopt.models.bicycles.tables import parameters, quantities
 from tmsopt.models.bicycles.tms_equations import compact_copo, copo, matrices
 from tmsopt.models.bicycles.tms_quantities import COMPUTED
-from tmsopt.models.model import Matrix, Model, ParameterSet
+from tmsopt.models.model import Matrices, Model, ParameterSet
 from tmsopt.models.tables import read_table
+from tmsopt.records import AnyNumbers
 
 __all__ = ["GRAVITY", "copo", "from_si", "matrices", "tms", "to_si"]
 
@@ -22,7 +22,7 @@ GRAVITY: float = _TABLES["parameters"]["SI"]["g"]["default"]
 """Default g in m/s²."""
 
 
-def _without_tilt(p: Mapping[str, Any]) -> dict[str, Any]:
+def _without_tilt(p: AnyNumbers) -> dict[str, Any]:
     """The native parameters without the tilt."""
     return {name: p[name] for name in _NATIVE.names if name != "lambda_s"}
 
@@ -30,7 +30,7 @@ def _without_tilt(p: Mapping[str, Any]) -> dict[str, Any]:
 _NATIVE = ParameterSet("dimensionless", parameters(_TABLES["parameters"]["dimensionless"]), native=dict)
 
 
-def from_si(p: Mapping[str, Any]) -> dict[str, Any]:
+def from_si(p: AnyNumbers) -> dict[str, Any]:
     """Dimensionless parameters for SI values (m, m/s, m/s², rad, kg), any numbers.
 
     Example:
@@ -51,7 +51,7 @@ def from_si(p: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def to_si(p: Mapping[str, Any], w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) -> dict[str, Any]:
+def to_si(p: AnyNumbers, w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) -> dict[str, Any]:
     """SI values for dimensionless parameters, given wheelbase w (m), rear frame mass m_B (kg) and g (m/s²).
 
     Gains of a controller are converted too.
@@ -78,19 +78,19 @@ def to_si(p: Mapping[str, Any], w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) 
     return {**own, **{n: p[native_name(n)] * si_scale(n, own, _rate, _torque) for n in FEEDBACK if native_name(n) in p}}
 
 
-def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
+def _pencil(p: AnyNumbers) -> Matrices:
     """M, V, P from tan λ_s alone: cos λ_s = 1/√(1 + tan² λ_s) on the open interval of tilts."""
     T = tan(p["lambda_s"])
     cosine = 1 / sqrt(1 + T * T)
     return matrices(**_without_tilt(p), sine=T * cosine, cosine=cosine)
 
 
-def _rate(p: Mapping[str, Any]) -> Any:
+def _rate(p: AnyNumbers) -> Any:
     """A rate of 1 in 1/s, √(g/w)."""
     return sqrt(p["g"] / p["w"])
 
 
-def _torque(p: Mapping[str, Any]) -> Any:
+def _torque(p: AnyNumbers) -> Any:
     """A torque of 1 in N m."""
     return p["m_B"] * p["g"] * p["w"]
 
@@ -133,7 +133,7 @@ tms = Model(
 """The two-mass-skate bicycle."""
 
 
-def _scaled_matrices(p: Mapping[str, Any]) -> tuple[Matrix, Matrix, Matrix]:
+def _scaled_matrices(p: AnyNumbers) -> Matrices:
     """M, V, P for a steer angle in units of 1/cos λ_s."""
     return matrices(**_without_tilt(p), sine=p["T"], cosine=1)
 

@@ -6,9 +6,10 @@ from typing import Any
 from tmsopt.algebra.kinds import absolute, choose, negligible, quotient, sqrt, tan
 from tmsopt.models.bicycles.bicycle import omega0, omega0_equation, smaller_eigenvalue
 from tmsopt.models.bicycles.tms_equations import matrices
+from tmsopt.records import AnyNumbers
 
 
-def _weave_condition(v: Mapping[str, Any]) -> tuple[list[Any], Any]:
+def _weave_condition(v: AnyNumbers) -> tuple[list[Any], Any]:
     """Terms of the numerator of Fr_c², and its denominator.
 
     The Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² is linear in Fr² and has the factor ζ_B − ζ_H. Without this
@@ -24,7 +25,7 @@ def _weave_condition(v: Mapping[str, Any]) -> tuple[list[Any], Any]:
     return numerator, lever * moment * zeta_B
 
 
-def _Fr_c(v: Mapping[str, Any]) -> Any:
+def _Fr_c(v: AnyNumbers) -> Any:
     terms, denominator = _weave_condition(v)
     numerator, size = sum(terms), sum(map(absolute, terms))
     level = negligible(v["chi_B"] - v["chi_H"], absolute(v["chi_B"]) + absolute(v["chi_H"]))
@@ -32,12 +33,12 @@ def _Fr_c(v: Mapping[str, Any]) -> Any:
     return absolute(sqrt(squared))  # turns −0 into 0
 
 
-def _Fr_c_equation(v: Mapping[str, Any], x: Any) -> Any:
+def _Fr_c_equation(v: AnyNumbers, x: Any) -> Any:
     terms, denominator = _weave_condition(v)
     return x * x * denominator - (terms[0] + terms[1] + terms[2])
 
 
-def _mass_margin(v: Mapping[str, Any]) -> Any:
+def _mass_margin(v: AnyNumbers) -> Any:
     """Smaller eigenvalue of M, from det M = μ ν_H² ζ_B², in which nothing cancels."""
     T = tan(v["lambda_s"])
     h = sqrt(1 + T * T)

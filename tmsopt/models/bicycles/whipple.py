@@ -4,7 +4,6 @@ Parameters left out are 0: without wheels, trail and moments of inertia this is 
 the same parameters and roots.
 """
 
-from collections.abc import Mapping
 from pkgutil import resolve_name
 from typing import Any
 
@@ -14,8 +13,9 @@ from tmsopt.models.bicycles.sketches import CONVENTIONS, WHIPPLE
 from tmsopt.models.bicycles.tables import parameters, quantities
 from tmsopt.models.bicycles.whipple_equations import carvallo_whipple, tangent_matrices
 from tmsopt.models.bicycles.whipple_quantities import COMPUTED, IN_MATRICES, algebraic, canonical
-from tmsopt.models.model import Matrix, Model, ParameterSet
+from tmsopt.models.model import Matrices, Matrix, Model, ParameterSet
 from tmsopt.models.tables import read_table
+from tmsopt.records import AnyNumbers
 
 _TABLES = read_table("bicycles/whipple")
 _NO_RADIUS = "a wheel without radius would turn infinitely fast"
@@ -32,12 +32,12 @@ _SI = ParameterSet(
 )
 
 
-def _pencil(p: Mapping[str, Any]) -> tuple[Matrix, ...]:
+def _pencil(p: AnyNumbers) -> Matrices:
     """M, v C1 and g K0 + v² K2."""
     return _matrices_at_speed(*canonical(p), p["v"], p["g"])
 
 
-def _matrices_at_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix, v: Any, g: Any) -> tuple[Matrix, Matrix, Matrix]:
+def _matrices_at_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix, v: Any, g: Any) -> Matrices:
     D = [[v * e for e in row] for row in C1]
     return M, D, [[g * a + v * v * b for a, b in zip(*rows, strict=True)] for rows in zip(K0, K2, strict=True)]
 
@@ -59,7 +59,7 @@ whipple = Model(
 """The Carvallo–Whipple bicycle; its roots are in 1/s."""
 
 
-def _scaled_matrices(p: Mapping[str, Any]) -> tuple[Matrix, Matrix, Matrix]:
+def _scaled_matrices(p: AnyNumbers) -> Matrices:
     """M, v C1 and g K0 + v² K2 for a steer angle in units of w/cos λ_s."""
     return _matrices_at_speed(*tangent_matrices(**{name: p[name] for name in ("T", *IN_MATRICES)}), p["v"], p["g"])
 

@@ -9,8 +9,7 @@ from tmsopt.algebra.kinds import both, choose, least, less, quotient, ratio, sqr
 from tmsopt.models.bicycles.bicycle import omega0, omega0_equation, smaller_eigenvalue
 from tmsopt.models.bicycles.whipple_equations import matrices, powers_of_speed, tangent_matrices
 from tmsopt.models.model import Matrix
-
-Design = Mapping[str, Any]
+from tmsopt.records import AnyNumbers
 
 _LARGE = 1e300  # above every relevant v²/g
 
@@ -33,17 +32,17 @@ def spin(I_yy: Any, r: Any) -> Any:
     return ratio(I_yy, r)
 
 
-def algebraic(p: Design) -> dict[str, Any]:
+def algebraic(p: AnyNumbers) -> dict[str, Any]:
     """The numbers in which the coefficients are polynomials: T = tan λ_s and the spins instead of I_yy."""
     return {"v": p["v"], "g": p["g"], "T": tan(p["lambda_s"]), **_bodies(p)}
 
 
-def _bodies(p: Design) -> dict[str, Any]:
+def _bodies(p: AnyNumbers) -> dict[str, Any]:
     spins = {"S_R": spin(p["I_Ryy"], p["r_R"]), "S_F": spin(p["I_Fyy"], p["r_F"])}
     return {name: p[name] for name in IN_MATRICES if name not in spins} | spins
 
 
-def canonical(p: Design) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+def canonical(p: AnyNumbers) -> tuple[Matrix, Matrix, Matrix, Matrix]:
     """M, C1, K0 and K2 of Meijaard et al. for the native parameters (v and g have no effect), for numbers of any kind.
 
     Example:
@@ -57,29 +56,29 @@ def canonical(p: Design) -> tuple[Matrix, Matrix, Matrix, Matrix]:
     return matrices(**_bodies(p), sine=sine, cosine=cosine, turn=cosine / p["w"])
 
 
-def _sine_cosine(p: Design) -> tuple[Any, Any]:
+def _sine_cosine(p: AnyNumbers) -> tuple[Any, Any]:
     """From tan λ_s alone: cos λ_s = 1/√(1 + tan² λ_s), because tilts lie in (−π/2, π/2)."""
     T = tan(p["lambda_s"])
     cosine = 1 / sqrt(1 + T * T)
     return T * cosine, cosine
 
 
-def _powers(v: Design) -> tuple[Any, ...]:
+def _powers(v: AnyNumbers) -> tuple[Any, ...]:
     """b0 … b7 of `powers_of_speed`, for a steer angle in units of w/cos λ_s."""
     return powers_of_speed(*tangent_matrices(tan(v["lambda_s"]), **_bodies(v)))
 
 
-def _v_capsize(v: Design) -> Any:
+def _v_capsize(v: AnyNumbers) -> Any:
     b = _powers(v)
     return sqrt(v["g"] * quotient(-b[6], b[7]))
 
 
-def _v_capsize_equation(v: Design, x: Any) -> Any:
+def _v_capsize_equation(v: AnyNumbers, x: Any) -> Any:
     b = _powers(v)
     return x * x * b[7] + v["g"] * b[6]
 
 
-def _v_weave(v: Design) -> Any:
+def _v_weave(v: AnyNumbers) -> Any:
     """√(g y) with the least y = v²/g > 0 that has a pair ± iω.
 
     The Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² divided by v² g² is quadratic in y. At a root the pair is
@@ -106,17 +105,17 @@ def _least_weave(one: Any, other: Any, b: tuple[Any, ...]) -> Any:
     return choose(less(found, _LARGE), found, math.nan)
 
 
-def _fork_offset(v: Design) -> Any:
+def _fork_offset(v: AnyNumbers) -> Any:
     sine, cosine = _sine_cosine(v)
     return v["r_F"] * sine - v["c"] * cosine
 
 
-def _u_H(v: Design) -> Any:
+def _u_H(v: AnyNumbers) -> Any:
     sine, cosine = _sine_cosine(v)
     return (v["x_H"] - v["w"] - v["c"]) * cosine - v["z_H"] * sine
 
 
-def _mass_margin(v: Design) -> Any:
+def _mass_margin(v: AnyNumbers) -> Any:
     """Smaller eigenvalue of M."""
     (first, mixed), (_, second) = canonical(v)[0]
     return smaller_eigenvalue(first, mixed, second, first * second - mixed * mixed)

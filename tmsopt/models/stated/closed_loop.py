@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from tmsopt.models.model import Matrix
 from tmsopt.models.stated.texts import Unfit
 
@@ -47,23 +49,9 @@ def close_loop(matrices: Mapping[str, Matrix]) -> dict[str, Matrix]:
     own = {key: rows for key, rows in matrices.items() if key not in LOOP}
     if "B" not in matrices:
         return own
-    gain = _product(matrices["B"], matrices["G"])
-    if "C" in matrices:
-        gain = _product(gain, matrices["C"])
+    B, G, C = (np.array(matrices.get(key, 0), dtype=object) for key in ("B", "G", "C"))
+    gain = B @ G @ C if "C" in matrices else B @ G
     if "A" in own:
-        return {"A": _sum(own["A"], [[-x for x in row] for row in gain])}
+        return {"A": (own["A"] - gain).tolist()}
     n = len(own["M"])
-    damping = own.get("D") or [[0] * n for _ in range(n)]
-    return {
-        "M": own["M"],
-        "D": _sum(damping, [row[n:] for row in gain]),
-        "K": _sum(own["K"], [row[:n] for row in gain]),
-    }
-
-
-def _product(A: Matrix, B: Matrix) -> Matrix:
-    return [[sum(x * y for x, y in zip(row, column, strict=True)) for column in zip(*B, strict=True)] for row in A]
-
-
-def _sum(A: Matrix, B: Matrix) -> Matrix:
-    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(A, B, strict=True)]
+    return {"M": own["M"], "D": (own.get("D", 0) + gain[:, n:]).tolist(), "K": (own["K"] + gain[:, :n]).tolist()}

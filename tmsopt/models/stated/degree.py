@@ -2,13 +2,13 @@
 
 import math
 import operator
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import CONSTANT, INPUT, Constant, Formula, Kind, Step
+from tmsopt.algebra.formula import CONSTANT, INPUT, Constant, Formula, Kind
 from tmsopt.algebra.kinds import FLOATS, as_double
 
 LARGEST_EXPONENT = 1023
@@ -76,10 +76,6 @@ class Degree:
         return Degree(math.ceil(abs(n) * over), math.ceil(abs(n) * under))
 
 
-def _constant(number: Any) -> Degree:
-    return Degree(0, 0, float(number))
-
-
 def _operation(join: Callable[..., Degree], name: str) -> Callable[..., Degree]:
     """An operation on degrees, which is computed if all operands are numbers."""
 
@@ -89,19 +85,9 @@ def _operation(join: Callable[..., Degree], name: str) -> Callable[..., Degree]:
         if len(numbers) < len(operands):
             return joined
         with np.errstate(all="ignore"):
-            return _constant(FLOATS.operations[name](*map(np.float64, numbers)))
+            return Degree(0, 0, float(FLOATS.operations[name](*map(np.float64, numbers))))
 
     return operation
-
-
-def _largest(*operands: Degree) -> Degree:
-    """Degree of a square root, an absolute value, a minimum or a maximum."""
-    return Degree(max(x.over for x in operands), max(x.under for x in operands))
-
-
-def _transcendental(*operands: Degree) -> Degree:
-    """Degree of a function that is not rational: its values have a fixed size."""
-    return Degree()
 
 
 _OPERATIONS: Mapping[str, Callable[..., Degree]] = {
@@ -111,8 +97,13 @@ _OPERATIONS: Mapping[str, Callable[..., Degree]] = {
     "div": operator.truediv,
     "square": lambda a: a * a,
     "pow": operator.pow,
-    **dict.fromkeys(("neg", "sqrt", "abs", "min", "max"), _largest),
-    **dict.fromkeys(("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan"), _transcendental),
+    **dict.fromkeys(
+        ("neg", "sqrt", "abs", "min", "max"),
+        lambda *operands: Degree(max(x.over for x in operands), max(x.under for x in operands)),
+    ),
+    **dict.fromkeys(
+        ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan"), lambda *operands: Degree()
+    ),  # of a fixed size
 }
 
 
@@ -121,7 +112,7 @@ def _constant_degree(x: Constant) -> Degree:
     if not math.isfinite(number):
         message = f"contains {number}, e.g. from a division by 0; accepted: finite numbers, and expressions of them"
         raise DegreeTooHigh(message)
-    return _constant(number)
+    return Degree(0, 0, number)
 
 
 DEGREES = Kind({name: _operation(join, name) for name, join in _OPERATIONS.items()}, _constant_degree)
@@ -136,21 +127,15 @@ def first_fault(formula: Formula) -> tuple[int, str] | None:
     found: list[Degree | str] = []
     for step in formula.steps:
         operands = [found[k] for k in step.operands]
-        wrong = next((o for o in operands if isinstance(o, str)), None)
-        degree = wrong or _step_degree(step, operands)
-        found.append(degree if isinstance(degree, str) or degree.number is not None else Degree())
+        wrong = next((o for o in operands if isinstance(o, str)), "")
+        degree = Degree()
+        if step.op not in (*DEGREES.operations, CONSTANT, INPUT):
+            functions = "sin cos tan asin acos atan sqrt exp log fabs fmin fmax"
+            wrong = wrong or f"uses {step.op}; accepted: + - * / ** and {functions}"
+        elif step.op != INPUT and not wrong:
+            try:
+                degree = DEGREES.constant(step.value) if step.op == CONSTANT else DEGREES.operations[step.op](*operands)
+            except DegreeTooHigh as error:
+                wrong = str(error)
+        found.append(wrong or (degree if degree.number is not None else Degree()))
     return next(((k, text) for k, o in enumerate(formula.outputs) if isinstance(text := found[o], str)), None)
-
-
-def _step_degree(step: Step, operands: Sequence[Any]) -> Degree | str:
-    """The degree of a step, or its fault."""
-    if step.op == INPUT:
-        return Degree()
-    if step.op not in (*DEGREES.operations, CONSTANT):
-        functions = "sin cos tan asin acos atan sqrt exp log fabs fmin fmax"
-        return f"uses {step.op}; accepted: + - * / ** and {functions}"
-    try:
-        found: Degree = DEGREES.constant(step.value) if step.op == CONSTANT else DEGREES.operations[step.op](*operands)
-        return found
-    except DegreeTooHigh as error:
-        return str(error)

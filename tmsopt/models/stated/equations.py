@@ -4,7 +4,9 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
-from tmsopt.models.model import Matrix
+import numpy as np
+
+from tmsopt.models.model import Matrices, Matrix
 from tmsopt.models.stated.pairs import Pair, pair
 from tmsopt.roots.polynomial import characteristic_polynomial, product, quadratic_pencil
 
@@ -46,7 +48,7 @@ def _add_carrier(R: Matrix, carrier: float) -> Matrix:
     return [[x + Fraction(carrier) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(R)]
 
 
-def pencil(blocks: dict[str, Matrix], carrier: float = 0.0) -> tuple[Matrix, ...]:
+def pencil(blocks: dict[str, Matrix], carrier: float = 0.0) -> Matrices:
     """Matrices of the matrix polynomial with these roots, in descending powers; for H those of the real system."""
     if "H" in blocks:
         R, J = blocks["H"], blocks[IMAGINARY]
@@ -56,5 +58,5 @@ def pencil(blocks: dict[str, Matrix], carrier: float = 0.0) -> tuple[Matrix, ...
         A = blocks["A"]
     else:
         M = blocks["M"]
-        return M, blocks.get("D") or [[0] * len(M) for _ in M], blocks["K"]
-    return [[int(i == j) for j in range(len(A))] for i in range(len(A))], [[-x for x in row] for row in A]
+        return M, blocks.get("D") or np.zeros((len(M), len(M)), dtype=int).tolist(), blocks["K"]
+    return np.eye(len(A), dtype=int).tolist(), [[-x for x in row] for row in A]

@@ -2,7 +2,7 @@
 
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from tmsopt.algebra.formula import Kind, constant, make_node
 from tmsopt.algebra.kinds import NODES
 from tmsopt.models.names import FUNCTIONS
 from tmsopt.models.stated.degree import LARGEST_EXPONENT, DegreeTooHigh
+from tmsopt.records import AnyNumbers
 
 UNIT = "_1j"
 """Name for 1j in parsed texts; no parameter may begin with an underscore."""
@@ -124,7 +125,7 @@ PAIRS = Kind(
     pair,
 )
 
-IMAGINARY_UNIT: Mapping[str, Any] = {UNIT: Pair(constant(0), constant(1))}
+IMAGINARY_UNIT: AnyNumbers = {UNIT: Pair(constant(0), constant(1))}
 
 
 def replace_literals(text: str) -> str:

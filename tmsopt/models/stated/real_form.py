@@ -12,7 +12,7 @@ from tmsopt.algebra.formula import Formula, Node, UnsupportedOperation, formula
 from tmsopt.algebra.intervals import Interval, ranges
 from tmsopt.algebra.kinds import values
 from tmsopt.models.model import Matrix, Model
-from tmsopt.records import Array
+from tmsopt.records import AnyNumbers, Array
 
 _ROOM = 16
 """A carrier serves other ranges too, while no root is farther from the axis than this many times the spread."""
@@ -49,7 +49,7 @@ def complex_model(
     carrier: float,
     bounds: Callable[[Mapping[str, Interval]], tuple[float, float]],
     with_carrier: Callable[[float], Model],
-    double: Callable[[Mapping[str, Any]], tuple[Matrix, ...]],
+    double: Callable[[AnyNumbers], tuple[Matrix, ...]],
 ) -> Model:
     """The model of a complex H from the model of its real system.
 

@@ -1,8 +1,8 @@
 """Parser of the entries and quantities of a system in text, which share their symbols."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
-from types import MappingProxyType
 from typing import Any
 
 from tmsopt.algebra.formula import Kind, symbol
@@ -12,7 +12,8 @@ from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import name_fault
 from tmsopt.models.stated.degree import DEGREES, Degree, DegreeTooHigh
-from tmsopt.models.stated.pairs import IMAGINARY_UNIT, PAIRS, Pair, entry_pair, pair, replace_literals, restore_literals
+from tmsopt.models.stated.pairs import IMAGINARY_UNIT, PAIRS, entry_pair, pair, replace_literals, restore_literals
+from tmsopt.records import Table
 
 MOST_QUANTITIES = 500
 """More would take seconds to parse."""
@@ -46,33 +47,26 @@ class Unfit(ValueError):
         return f"{self.key}: {self.message}"
 
 
+@dataclass
 class Texts:
     """Turns the texts of one system into nodes.
 
     Attributes:
-        names: names in the texts so far.
-
-    Args:
         fault: called with a message and its place: ``M``, or ``quantities`` and a name.
-        known: quantities that are not texts.
+        known: quantities that are not texts, and those already built.
         kind: kind of numbers for entries.
         constants: names with a fixed value in it.
+        names: names in the texts so far.
     """
 
-    def __init__(
-        self,
-        fault: Callable[..., None],
-        known: Mapping[str, Any] | None = None,
-        kind: Kind = NODES,
-        constants: Mapping[str, Any] = MappingProxyType({}),
-    ) -> None:
-        self.fault = fault
-        self.kind, self.constants = kind, constants
-        self.names: dict[str, None] = {}
-        self.known = dict(known or {})
-        self.expressions: dict[str, Expression | None] = {}
-        self._degrees: dict[str, Degree] = {}
-        self._order: tuple[str, ...] = ()
+    fault: Callable[..., None]
+    known: dict[str, Any]
+    kind: Kind = NODES
+    constants: Mapping[str, Any] = Table()
+    names: dict[str, None] = field(default_factory=dict)
+    expressions: dict[str, Expression | None] = field(default_factory=dict)
+    _degrees: dict[str, Degree] = field(default_factory=dict)
+    _order: tuple[str, ...] = ()
 
     def entry(self, text: str, key: str, where: str) -> Any:
         """One entry as a number of the kind; 0 if it has a fault."""
@@ -123,10 +117,6 @@ class Texts:
             values[name] = self.quantity(name) if derived else symbol(name)
         try:
             degree = expression.of({n: self._degrees.get(n, Degree()) for n in values}, DEGREES)
-        except DegreeTooHigh as error:
-            self.fault(f"{where}{error}", *key)
-            return 0, Degree()
-        try:
             return expression.of(values, kind), degree
         except DegreeTooHigh as error:
             self.fault(f"{where}'{expression.text}' {error}", *key)
@@ -157,25 +147,22 @@ def parse_entries(
     """Matrices and quantities with nodes in place of texts; every entry of a complex H becomes a pair."""
     in_text = {n: x for n, x in derived.items() if isinstance(x, str)}
     known, of_H = {n: x for n, x in derived.items() if n not in in_text}, "H" in matrices
-    texts = Texts(fault, known)
+    texts = Texts(fault, dict(known))
     if of_H:
-        texts = Texts(lambda message, *key: fault(restore_literals(message), *key), known, PAIRS, IMAGINARY_UNIT)
+        texts = Texts(lambda message, *key: fault(restore_literals(message), *key), dict(known), PAIRS, IMAGINARY_UNIT)
     texts.read_quantities(in_text)
 
     def entry(x: Any, n: str, i: int, j: int) -> Any:
-        where = place(n, i, j)
+        where, earlier = place(n, i, j), set(texts.names)
+        if isinstance(x, str) and not of_H:
+            return texts.entry(x, n, where)
         if isinstance(x, str):
-            return parse_pair(x, where) if of_H else texts.entry(x, n, where)
-        if of_H and isinstance(x, tuple) and len(x) != 2:
+            x = pair(texts.entry(replace_literals(x), n, where))
+            for name in (name for name in _UNIT_NAMES if name in texts.names and name not in earlier):
+                fault(f"{where}: '{name}' would be a parameter; write the imaginary unit as 1j", n)
+        elif of_H and isinstance(x, tuple) and len(x) != 2:
             fault(f"{where}: found {short(x)}; accepted: a real and an imaginary part", n)
         return entry_pair(x) if of_H else x
-
-    def parse_pair(text: str, where: str) -> Pair:
-        earlier = set(texts.names)
-        found = pair(texts.entry(replace_literals(text), "H", where))
-        for name in (n for n in _UNIT_NAMES if n in texts.names and n not in earlier):
-            fault(f"{where}: '{name}' would be a parameter; write the imaginary unit as 1j", "H")
-        return found
 
     parsed = {
         n: [[entry(x, n, i, j) for j, x in enumerate(row, start=1)] for i, row in enumerate(rows, start=1)]

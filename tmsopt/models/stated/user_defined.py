@@ -1,9 +1,11 @@
 """Models of the user's own, by matrices, by a characteristic polynomial, or by a complex H."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache
+from itertools import islice
 from numbers import Rational, Real
 from typing import Any, NoReturn
 
@@ -26,7 +28,7 @@ from tmsopt.algebra.identity import Field
 from tmsopt.algebra.kinds import BALLS, NODES, values
 from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
-from tmsopt.models.model import Matrix, Model, Parameter, ParameterSet, Quantity
+from tmsopt.models.model import Matrices, Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, name_fault, number_text, spell_formula
 from tmsopt.models.stated.closed_loop import LOOP, check_loop, close_loop
 from tmsopt.models.stated.degree import first_fault
@@ -34,15 +36,16 @@ from tmsopt.models.stated.equations import IMAGINARY, pencil, polynomial, sort_p
 from tmsopt.models.stated.pairs import complex_text
 from tmsopt.models.stated.real_form import complex_model, frequency_bounds
 from tmsopt.models.stated.texts import Unfit, parse_entries, place
+from tmsopt.records import AnyNumbers
 
 _ACCEPTED = "accepted: finite numbers, expressions in quotes, and SX expressions"
 _FINITE = "accepted: finite numbers, and expressions of them"
 
-MOST = {"M": 6, "A": 12, "H": 6, "coefficients": 12}
-"""Largest size of M, D, K; of A; of H; and largest degree."""
+_MOST = dict.fromkeys("MDKH", 6) | dict.fromkeys(("A", "coefficients", *LOOP), 12)
+"""Largest size of a matrix, and largest degree."""
 
+_Shape = tuple[str, int, int]  # key, rows and columns of a matrix
 _SAMPLES = 24  # designs at which a leading coefficient must vanish before it is examined
-_GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 def from_matrices(
@@ -55,7 +58,7 @@ def from_matrices(
     C: Any = None,
     G: Any = None,
     name: str = "stated",
-    quantities: Mapping[str, Any] | None = None,
+    quantities: AnyNumbers | None = None,
 ) -> Model:
     """A model of M q″ + D q′ + K q = B u, or of x′ = A x + B u, from numbers, texts and CasADi expressions.
 
@@ -88,15 +91,16 @@ def from_matrices(
     for n in () if "A" in given else ("M", "K"):
         if n not in given:
             raise Unfit(n, "is missing; give M and K (and D), or A, or coefficients")
-    matrices = {n: _rectangular(n, value) if n in LOOP else square(n, value) for n, value in given.items()}
-    for n, size in ((n, len(rows)) for n, rows in matrices.items() if n in ("D", "K")):
-        if size != (most := len(matrices["M"])):
+    matrices = {n: _read_matrix(n, value) for n, value in given.items()}
+    most = len(masses := matrices.get("M", []))
+    for n in ("D", "K"):
+        if (size := len(matrices.get(n, masses))) != most:
             raise Unfit(n, f"is {size} × {size}, but M is {most} × {most}; accepted: matrices of one size")
     check_loop({n: (len(rows), len(rows[0])) for n, rows in matrices.items()})
-    return build_model("matrices", name, matrices, quantities)
+    return _build_model("matrices", name, matrices, quantities)
 
 
-def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: Mapping[str, Any] | None = None) -> Model:
+def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: AnyNumbers | None = None) -> Model:
     """A model of a characteristic polynomial with descending coefficients, each like an entry of `from_matrices`.
 
     Raises:
@@ -109,15 +113,15 @@ def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: Ma
 
     More: docs/tutorials/own_system.md
     """
-    row = _entries(coefficients)
-    if row is None or any(_entries(x) is not None for x in row) or not 2 <= len(row) <= MOST["coefficients"] + 1:
-        found = "no list" if row is None else f"{len(row)} entries" if row else "none"
-        accepted = f"a list of 2 to {MOST['coefficients'] + 1} coefficients, descending"
-        raise Unfit("coefficients", f"found {found}; accepted: {accepted}")
-    return build_model("coefficients", name, {"coefficients": [row]}, quantities)
+    given, most = _entries(coefficients), _MOST["coefficients"] + 1
+    row = None if given is None or any(_entries(x) is not None for x in given) else given
+    if row is None or not 2 <= len(row) <= most:
+        found = "no list" if row is None else f"{len(row)} entries"
+        raise Unfit("coefficients", f"found {found}; accepted: a list of 2 to {most} coefficients, descending")
+    return _build_model("coefficients", name, {"coefficients": [row]}, quantities)
 
 
-def from_hamiltonian(H: Any, *, name: str = "stated", quantities: Mapping[str, Any] | None = None) -> Model:
+def from_hamiltonian(H: Any, *, name: str = "stated", quantities: AnyNumbers | None = None) -> Model:
     """A model of ψ′ = −i H ψ with a complex matrix H and eigenfrequencies ω = i s.
 
     Results refer to H: ``EP2`` is an exceptional point of H, the ``abscissa`` is the greatest Im ω (gain minus loss),
@@ -142,54 +146,42 @@ def from_hamiltonian(H: Any, *, name: str = "stated", quantities: Mapping[str, A
 
     More: docs/explanation/exceptional_points.md
     """
-    return build_model("hamiltonian", name, {"H": square("H", H)}, quantities)
+    return _build_model("hamiltonian", name, {"H": _read_matrix("H", H)}, quantities)
 
 
 def _entries(value: Any) -> list[Any] | None:
-    """The entries of a list, a CasADi vector or a one-dimensional array; None for other values."""
+    """The entries of a list, a CasADi vector or an array; None for other values."""
     if isinstance(value, ca.SX | ca.DM):
-        return [value[k] for k in range(value.numel())] if 1 in value.shape and value.numel() > 1 else None
+        return ca.vertsplit(ca.vec(value)) if value.is_vector() and not value.is_scalar() else None
     if isinstance(value, np.ndarray):
-        return list(value) if value.ndim == 1 else None
+        return list(value) if value.ndim else None
     return list(value) if isinstance(value, Sequence) and not isinstance(value, str) else None
 
 
-def _rows(value: Any) -> list[list[Any] | None] | None:
-    """The rows of a matrix, None for a row that is not a list; None if the value is not a matrix."""
+def _read_matrix(key: str, value: Any) -> Matrix:
+    """The rows of a matrix; those of a controller may have any length, the others are square."""
     if isinstance(value, ca.SX | ca.DM):
-        return [[value[i, j] for j in range(value.shape[1])] for i in range(value.shape[0])]
-    if isinstance(value, np.ndarray):
-        return [list(row) for row in value] if value.ndim == 2 else None
-    rows = _entries(value)
-    return None if rows is None else [_entries(row) for row in rows]
-
-
-def square(key: str, value: Any) -> Matrix:
-    rows = _rows(value)
-    if rows is None:
+        rows: list[Any] = [ca.horzsplit(row) for row in ca.vertsplit(value)]
+    elif (entries := _entries(value)) is None or (isinstance(value, np.ndarray) and value.ndim != 2):
         found = f"an array of {value.ndim} dimensions" if isinstance(value, np.ndarray) else type(value).__name__
         raise Unfit(key, f"found {found}; accepted: a matrix as nested lists, a NumPy array, SX or DM")
-    found_rows = [row for row in rows if row is not None and len(row) == len(rows)]
-    if not rows or len(found_rows) < len(rows):
-        shape = " + ".join("?" if row is None else str(len(row)) for row in rows)
-        raise Unfit(key, f"found rows of {shape or 'no'} entries; accepted: as many rows as entries in each")
-    most = MOST.get(key, MOST["M"])
-    if len(rows) > most:
-        raise Unfit(key, f"is {len(rows)} × {len(rows)}; accepted: up to {most} × {most}")
-    return found_rows
+    else:
+        rows = [_entries(row) for row in entries]
+    sizes, most = [None if row is None else len(row) for row in rows], _MOST[key]
+    size, accepted = len(rows), "as many rows as entries in each"
+    if key in LOOP:
+        size, accepted = next(iter(sizes), 0) or 0, "rows of equal length"
+    if not size or any(found != size for found in sizes):
+        shape = " + ".join("?" if found is None else str(found) for found in sizes)
+        raise Unfit(key, f"found rows of {shape or 'no'} entries; accepted: {accepted}")
+    if max(size, len(rows)) > most:
+        raise Unfit(key, f"is {len(rows)} × {size}; accepted: up to {most} × {most}")
+    return rows
 
 
-def _rectangular(key: str, value: Any) -> Matrix:
-    rows = _rows(value)
-    found = [row for row in rows or () if row and len(row) == len((rows or [[]])[0] or ())]
-    if rows is None or not rows or len(found) < len(rows) or max(len(rows), len(found[0])) > MOST["A"]:
-        raise Unfit(key, f"found {short(value)}; accepted: rows of equal length, up to {MOST['A']} × {MOST['A']}")
-    return found
-
-
-def build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> Model:
+def _build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> Model:
     """The model of a system; equal systems give the same object."""
-    key = next(iter(matrices))
+    key, of_H = next(iter(matrices)), kind == "hamiltonian"
     if not isinstance(name, str) or not name.strip() or not name.isprintable():
         raise Unfit("name", f"found {name!r}; accepted: a text of one line")
     if name.strip() in MODELS:
@@ -199,7 +191,7 @@ def build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: A
     matrices, derived = parse_entries(
         matrices, {n: _node("quantities", n, x) for n, x in (quantities or {}).items()}, _unfit
     )
-    if kind == "hamiltonian":
+    if of_H:
         H = matrices["H"]
         matrices = {"H": [[x.re for x in row] for row in H], IMAGINARY: [[x.im for x in row] for row in H]}
     by_place = {
@@ -208,21 +200,19 @@ def build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: A
         for i, row in enumerate(rows, start=1)
         for j, x in enumerate(row, start=1)
     } | {("quantities", str(n)): x for n, x in derived.items()}
-    symbols = [
-        x.name() for x in ca.symvar(ca.vertcat(ca.SX(0, 1), *(x for x in by_place.values() if isinstance(x, ca.SX))))
-    ]
+    inputs = ca.symvar(ca.vertcat(ca.SX(0, 1), *(x for x in by_place.values() if isinstance(x, ca.SX))))
+    symbols = Counter(x.name() for x in inputs)
     entries = {at: _node(user_key(at[0]), at[1], x) for at, x in by_place.items()}
     names = formula(entries[at] for at in sort_places(kind, entries)).names
-    duplicates = {n for n in symbols if symbols.count(n) > 1}
-    if duplicates:
+    if duplicates := [n for n, count in symbols.items() if count > 1]:
         raise Unfit(key, f"has two symbols named {min(duplicates)}; make one and use it everywhere")
     if not names:
         raise Unfit(key, "names no parameter, so there is nothing to design; write a name in an entry, such as 'k'")
     for n in names:
-        if why := name_fault(n, kind == "hamiltonian"):
+        if why := name_fault(n, of_H):
             raise Unfit(key, f"has a symbol named {n!r}, which {why}; choose another name")
     for n in derived:
-        if why := "is the name of a parameter" if n in names else name_fault(n, kind == "hamiltonian"):
+        if why := "is the name of a parameter" if n in names else name_fault(n, of_H):
             raise Unfit("quantities", f"{n!r} {why}; choose another name for the quantity")
     shapes = tuple((n, len(rows), len(rows[0])) for n, rows in matrices.items())
     stated = formula(entries.values(), names)
@@ -236,7 +226,7 @@ def build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: A
 def _rebuilt(
     kind: str,
     name: str,
-    shapes: tuple[tuple[str, int, int], ...],
+    shapes: tuple[_Shape, ...],
     derived: tuple[str, ...],
     stated: Formula,
     carrier: float = 0.0,
@@ -245,62 +235,57 @@ def _rebuilt(
     names = stated.names
     entries = fold(stated, {n: symbol(n) for n in names}, NODES)
     rest = iter(entries)
-    blocks = close_loop({n: [[next(rest) for _ in range(columns)] for _ in range(rows)] for n, rows, columns in shapes})
+    blocks = close_loop(_split(rest, shapes))
     every = polynomial(kind, blocks, carrier)
     degree = len(every) - 1
     lost = _leading_zeros(formula(every, names))
     lost = lost and _count_identical_zeros(kind, blocks, names, lost)
     if lost == degree:
         raise Unfit(shapes[0][0], "gives a polynomial without s, which has no root")
-    coefficients, quantities = formula(every[lost:], names), dict(zip(derived, rest, strict=True))
-
-    parameter_set = ParameterSet("stated", tuple(Parameter(n, "1", "parameter", latex(n)) for n in names), native=dict)
+    coefficients, quantities = formula(every[lost:], names), zip(derived, rest, strict=True)
+    parameters = tuple(Parameter(n, "1", "parameter", latex(n)) for n in names)
     plain = (kind, name, shapes, derived, stated)
     model = Model(
         name=name,
         title=name,
         degree=degree - lost,
-        sets=(parameter_set,),
+        sets=(ParameterSet("stated", parameters, native=dict),),
         algebraic=dict,
         polynomial=lambda **given: values(coefficients, given),
-        quantities=tuple(Quantity(n, "1", "quantity", latex(n), _function(x, names)) for n, x in quantities.items()),
+        quantities=tuple(Quantity(n, "1", "quantity", latex(n), _function(x, names)) for n, x in quantities),
         pencil=None if kind == "coefficients" else _matrices(pencil(blocks, carrier), names),
         origin=(_rebuilt, (*plain, carrier) if carrier else plain),
         statement=_statement(stated, shapes, derived),
-        numbers=_numbers(stated),
+        numbers=tuple(number_text(x) for x in stated.constants if getattr(x, "denominator", 0) != 1),
     )
     if kind != "hamiltonian":
         return model
     return complex_model(
         model,
         carrier,
-        frequency_bounds(entries[: sum(rows * columns for _, rows, columns in shapes)]),
+        frequency_bounds(entries[: len(entries) - len(derived)]),
         lambda c: _rebuilt(*plain, *([c] if c else [])),
         _matrices(pencil(blocks), names),
     )
 
 
-def _function(x: Any, names: Sequence[str]) -> Callable[[Mapping[str, Any]], Any]:
+def _function(x: Any, names: Sequence[str]) -> Callable[[AnyNumbers], Any]:
     own = formula([x], names)
     return lambda given: values(own, given)[0]
 
 
-def _matrices(rows: Sequence[Matrix], names: Sequence[str]) -> Callable[[Mapping[str, Any]], tuple[Matrix, ...]]:
+def _matrices(rows: Sequence[Matrix], names: Sequence[str]) -> Callable[[AnyNumbers], Matrices]:
     """A function from named numbers to matrices, for matrices of nodes."""
     n, own = len(rows[0]), formula((x for P in rows for row in P for x in row), names)
-
-    def evaluate(given: Mapping[str, Any]) -> tuple[Matrix, ...]:
-        found = iter(values(own, given))
-        return tuple([[next(found) for _ in range(n)] for _ in range(n)] for _ in rows)
-
-    return evaluate
+    shapes = [(str(k), n, n) for k in range(len(rows))]
+    return lambda given: tuple(_split(iter(values(own, given)), shapes).values())
 
 
 def _count_identical_zeros(kind: str, blocks: Mapping[str, Matrix], names: Sequence[str], leading: int) -> int:
     """How many of the first `leading` coefficients are identically 0, counted up to the first that is not."""
-    none = [[0] * len(blocks["M"]) for _ in blocks["M"]] if "M" in blocks else []
-    ignored = ("D", "K")[max(leading - 1, 0) :] if none else ()  # without effect on these coefficients
-    own = {**blocks, **dict.fromkeys(ignored, none)}
+    own = dict(blocks)
+    for n in ("D", "K")[max(leading - 1, 0) :] if "M" in own else ():  # without effect on these coefficients
+        own[n] = [[0] * len(own["M"]) for _ in own["M"]]
     coefficients = formula(polynomial(kind, own)[:leading], names)
     field = Field(coefficients)
     try:
@@ -310,22 +295,20 @@ def _count_identical_zeros(kind: str, blocks: Mapping[str, Matrix], names: Seque
         return 0
 
 
-def _numbers(stated: Formula) -> tuple[str, ...]:
-    """Texts of the constants that are not whole numbers."""
-    return tuple(number_text(x) for x in stated.constants if not (isinstance(x, Fraction) and x.denominator == 1))
-
-
-def _statement(stated: Formula, shapes: Sequence[tuple[str, int, int]], derived: Sequence[str]) -> dict[str, Any]:
+def _statement(stated: Formula, shapes: tuple[_Shape, ...], derived: Sequence[str]) -> dict[str, Any]:
     """Plain data that identify a model, with every digit of its numbers."""
     texts, shared = spell_formula(stated)
     rest = iter(texts)
-    matrices = {n: [[next(rest) for _ in range(columns)] for _ in range(rows)] for n, rows, columns in shapes}
-    quantities = dict(zip(derived, rest, strict=True))
+    matrices, quantities = _split(rest, shapes), dict(zip(derived, rest, strict=True))
     if IMAGINARY in matrices:
-        imaginary = matrices.pop(IMAGINARY)
-        each = (zip(re, im, strict=True) for re, im in zip(matrices["H"], imaginary, strict=True))
-        matrices["H"] = [[complex_text(re, im) for re, im in row] for row in each]
+        rows = zip(matrices["H"], matrices.pop(IMAGINARY), strict=True)
+        matrices["H"] = [list(map(complex_text, *row)) for row in rows]
     return {"parameters": list(stated.names), **matrices, "quantities": quantities, "shared": shared}
+
+
+def _split(entries: Iterator[Any], shapes: Iterable[_Shape]) -> dict[str, Matrix]:
+    """Matrices with rows and columns of the given numbers, filled with entries one after the other."""
+    return {n: [list(islice(entries, columns)) for _ in range(rows)] for n, rows, columns in shapes}
 
 
 def _leading_zeros(coefficients: Formula) -> int:
@@ -333,23 +316,20 @@ def _leading_zeros(coefficients: Formula) -> int:
 
     A ball of 60 digits at one of 24 designs, of many sizes and signs, shows that a coefficient is not.
     """
-    lost, is_known, names = 0, False, coefficients.names
+    names, rng = coefficients.names, np.random.default_rng(0)
+    found: list[int] = []
     with flint.ctx.workdps(DIGITS):
         for i in range(_SAMPLES):
-            share = [math.modf((i * len(names) + k + 1) * _GOLDEN)[0] for k in range(len(names))]
             # A third of the designs has both signs; sizes are near 1 in the first half, then from 1e-6 to 1e6.
-            signs = [-1 if i % 3 == 2 and math.modf(8 * x)[0] < 0.5 else 1 for x in share]
-            reach = 6 if i < _SAMPLES // 2 else 40
-            design = [sign * 2.0 ** (reach * (x - 0.5)) for sign, x in zip(signs, share, strict=True)]
-            found = [flint.arb(c) for c in fold(coefficients, dict(zip(names, design, strict=True)), BALLS)]
-            nonzero = next(
-                (k for k, c in enumerate(found[:-1]) if not c.contains(0) or not c.is_finite()), len(found) - 1
-            )
-            if all(c.is_finite() for c in found[: nonzero + 1]):
-                lost, is_known = (min(lost, nonzero) if is_known else nonzero), True
-            if is_known and lost == 0:
-                return 0
-    return lost
+            signs = rng.choice((-1, 1) if i % 3 == 2 else (1,), len(names))
+            design = signs * 2.0 ** (rng.uniform(-0.5, 0.5, len(names)) * (6 if i < _SAMPLES // 2 else 40))
+            balls = [flint.arb(c) for c in fold(coefficients, dict(zip(names, design.tolist(), strict=True)), BALLS)]
+            zeros = [c.is_finite() and c.contains(0) for c in balls[:-1]]
+            first = zeros.index(False) if False in zeros else len(zeros)
+            found += [first] if balls[first].is_finite() else []
+            if 0 in found:
+                break
+    return min(found, default=0)
 
 
 def _unfit(message: str, key: str, *name: str) -> NoReturn:

@@ -22,20 +22,16 @@ _EXAMPLES = (
 def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity]:
     """Every name that an expression may use, in the order of the documentation."""
     native = () if of is model.sets[0] else model.sets[0].parameters
-    known: dict[str, Parameter | Quantity] = {
-        n: Quantity(n, "", _coefficient_meaning(model.degree - k), f"a_{{{k}}}", itemgetter(n))
-        for k, n in enumerate(model.coefficient_names())
-    }
+    words = {0: "constant coefficient", 1: "coefficient of s"}
+    known: dict[str, Parameter | Quantity] = {}
+    for k, n in zip(range(model.degree, -1, -1), model.coefficient_names(), strict=True):
+        meaning = f"{words.get(k, f'coefficient of s^{k}')} in the characteristic polynomial"
+        known[n] = Quantity(n, "", meaning, f"a_{{{model.degree - k}}}", itemgetter(n))
     derived = (*model.quantities, *of.quantities, *ROOT_QUANTITIES, NO_RADIUS)
     known |= {p.name: p for p in (*native, *of.parameters)} | {q.name: q for q in derived}
     if model.carrier is not None:
         known["abscissa"] = replace(ROOT_QUANTITIES[0], meaning="largest Im omega, gain less loss")
     return {name: known[name] for name in (*of.names, *public_names(model, of), *root_names(model))}
-
-
-def _coefficient_meaning(k: int) -> str:
-    what = "constant coefficient" if k == 0 else f"coefficient of s^{k}" if k > 1 else "coefficient of s"
-    return f"{what} in the characteristic polynomial"
 
 
 def suggest_name(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] | None = None) -> str:

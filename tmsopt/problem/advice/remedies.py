@@ -9,7 +9,7 @@ from tmsopt.models.expression import written_sides
 from tmsopt.problem.limit import split_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import unit_of
-from tmsopt.records import Table, plain
+from tmsopt.records import Numbers, Table, plain
 
 DIGITS = 5
 """Significant digits of a suggested limit."""
@@ -82,7 +82,7 @@ def round_outwards(x: float, up: bool, digits: int = DIGITS) -> float:
     return (math.ceil if up else math.floor)(round(x / step, 6)) * step
 
 
-def move_limits(problem: Posed, amounts: Mapping[str, float], digits: int = DIGITS) -> dict[str, str]:
+def move_limits(problem: Posed, amounts: Numbers, digits: int = DIGITS) -> dict[str, str]:
     """Move limits by amounts and write them as a file would, rounded outwards.
 
     Returns:

@@ -1,17 +1,17 @@
 """Readings: numbers in mm, km/h and degrees, and the decay times and frequencies of roots."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from types import MappingProxyType
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from tmsopt.models import ParameterSet
+from tmsopt.records import AnyNumbers
 
 Reading = float | tuple[float, ...]
 """A number, or one per root; nan if undefined."""
 
-_READ_IN = MappingProxyType({"m": ("mm", 1000), "m/s": ("km/h", 18), "rad": ("deg", 180)})
-
+_READ_IN = {"m": ("mm", 1000, 1), "m/s": ("km/h", 18, 5), "rad": ("deg", 180, None)}
+"""SI unit → unit to read it in, factor and divisor; None for π."""
 
 _TIMES = ("decay_rate", "decay_time", "frequency")
 """Quantities that are readings already."""
@@ -28,8 +28,8 @@ def convert_exactly(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str,
     """
     if unit not in _READ_IN:
         return value, unit, 0
-    name, factor = _READ_IN[unit]
-    return value * factor / {"mm": 1, "km/h": 5, "deg": pi}[name], name, READ_DIGITS
+    name, factor, divisor = _READ_IN[unit]
+    return value * factor / (divisor or pi), name, READ_DIGITS
 
 
 def convert_to_reading(value: float, unit: str) -> tuple[float, str]:
@@ -48,11 +48,6 @@ def decay_time(abscissa: Any, rate: Any) -> Any:
     return 1 / (-abscissa * rate) if abscissa < 0 else math.nan
 
 
-def growth_time(abscissa: Any, rate: Any) -> Any:
-    """Seconds in which the fastest part of a disturbance grows e-fold; nan unless it grows."""
-    return decay_time(-abscissa, rate)
-
-
 def frequencies(roots: Iterable[Any], rate: Any, pi: Any = math.pi) -> tuple[Any, ...]:
     """Frequency in Hz of each distinct complex pair of roots, in the order of the roots."""
     return tuple(root.im * rate / (2 * pi) for root in roots if root.im > 0)
@@ -60,8 +55,8 @@ def frequencies(roots: Iterable[Any], rate: Any, pi: Any = math.pi) -> tuple[Any
 
 def readings(
     of: ParameterSet,
-    parameters: Mapping[str, Any],
-    quantities: Mapping[str, Any],
+    parameters: AnyNumbers,
+    quantities: AnyNumbers,
     abscissa: Any,
     roots: Iterable[Any],
     pi: Any = math.pi,
@@ -75,7 +70,7 @@ def readings(
         return
     rate = of.rate(parameters)
     yield "decay_time_s", decay_time(abscissa, rate), 0
-    yield "growth_time_s", growth_time(abscissa, rate), 0
+    yield "growth_time_s", decay_time(-abscissa, rate), 0
     yield "frequencies_Hz", frequencies(roots, rate, pi), 0
     units = {p.name: p.unit for p in of.parameters} | {q.name: q.unit for q in of.quantities if q.name not in _TIMES}
     for name in (n for n, unit in units.items() if unit != "1"):

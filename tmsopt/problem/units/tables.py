@@ -10,6 +10,7 @@ from tmsopt.errors import Fault
 from tmsopt.models import ParameterSet, decimal
 from tmsopt.models.exact import Exact
 from tmsopt.problem.units.text import LONGEST, parse_exact_quantity
+from tmsopt.records import AnyNumbers
 
 TABLES = ("free", "fixed", "start", "scenarios", "tolerances", "weights")
 """Tables of a problem that hold numbers; the first unit typed for a parameter is kept."""
@@ -18,9 +19,7 @@ Typed = dict[str, dict[float, str]]
 """Parameter → double → the exact number that was typed, if the double's decimal differs."""
 
 
-def read_numbers(
-    tables: Mapping[str, Any], of: ParameterSet
-) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
+def read_numbers(tables: AnyNumbers, of: ParameterSet) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
     """Convert texts such as "25 cm" in the tables of a problem to numbers.
 
     Args:
@@ -36,16 +35,15 @@ def read_numbers(
     def number(value: Any, table: str, name: str, *end: str) -> Any:
         if name not in of.names or not isinstance(value, str | Fraction | int) or isinstance(value, bool):
             return value
-        unit = of[name].unit
-        sizes = table in ("tolerances", "weights")
+        sizes, unit = table in ("tolerances", "weights"), of[name].unit
         if unit == "1" and sizes:
             unit = of[name].multiple_of or unit  # 5 mm is 0.005 of a wheelbase of 1 m
         try:
-            found, written, exact = (
-                parse_exact_quantity(value, unit)
-                if isinstance(value, str)
-                else (value, "", Exact.from_fraction(Fraction(value)))
-            )
+            found: Any
+            if isinstance(value, str):
+                found, written, exact = parse_exact_quantity(value, unit)
+            else:
+                found, written, exact = value, "", Exact.from_fraction(Fraction(value))
             if not sizes and exact and exact.fraction != decimal(float(found)):
                 typed.setdefault(name, {})[float(found)] = str(exact)
         except OverflowError:  # an integer too large for a double
@@ -59,12 +57,13 @@ def read_numbers(
 
     def read_table(table: str, key: str) -> Iterator[tuple[str, Any]]:
         for name, value in tables[table].items():
+            is_list = isinstance(value, Sequence) and not isinstance(value, str)
             if is_dataclass(value) and not isinstance(value, type):  # a band
                 ends = {end: number(getattr(value, end), key, name, end) for end in ("min", "max")}
                 yield name, replace(value, **ends)
-            elif table == "free" and isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2:
+            elif table == "free" and is_list and len(value) == 2:
                 yield name, tuple(number(x, key, name, end) for x, end in zip(value, ("min", "max"), strict=True))
-            elif table == "scenarios" and isinstance(value, Sequence) and not isinstance(value, str):
+            elif table == "scenarios" and is_list:
                 yield name, tuple(number(x, key, name) for x in value)
             else:
                 yield name, number(value, key, name, *(["start"] if table == "start" else []))

@@ -9,6 +9,7 @@ from typing import Any
 
 from tmsopt.models.exact import Exact, constant
 from tmsopt.models.tables import read_table
+from tmsopt.records import Numbers
 
 LONGEST = 80
 """Characters of a number with its unit."""
@@ -24,7 +25,7 @@ _UNIT = re.compile(rf"[A-Za-zµμ°%]+{_POWER}(?:(?: ?[*/] ?| )[A-Za-zµμ°%]+{
 _TWO_PARAMETERS = "write its parts as two parameters, kr + 1j*ki in H"
 
 _UNITS = read_table("units")
-USUAL: Mapping[str, Mapping[str, float]] = _UNITS["usual"]
+USUAL: Mapping[str, Numbers] = _UNITS["usual"]
 """Unit → other common unit → factor to the first, without loading pint."""
 
 

@@ -1,6 +1,6 @@
 """Finds the eigenvectors of multiple roots, by ranks of the model's matrices."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import flint
@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.models.user_spectrum import user_roots
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.stability import MultipleRoot
-from tmsopt.records import Array, Complex
+from tmsopt.records import Array, Complex, Numbers
 from tmsopt.roots import Pattern, Root, jordan
 from tmsopt.roots.jordan import equilibrate
 from tmsopt.roots.patterns.structure import fit_unknowns
@@ -23,7 +23,7 @@ _NEAR = 1e-6  # relative distance within which two roots are the same
 _UNIT = 1e-3  # least unit for scaling the matrices at a root, as a share of the largest root
 
 
-def meetings(problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
+def meetings(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
     """The multiple roots among the roots of a design's polynomial, rightmost first, as users read them."""
     found: list[MultipleRoot] = []
     of_H = problem.model.carrier is not None
@@ -35,23 +35,22 @@ def meetings(problem: Posed, parameters: Mapping[str, float], roots: Sequence[Ro
     return tuple(sorted(found, key=lambda m: (-m.re, -m.im)))
 
 
-def is_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> bool:
+def is_crossing(problem: Posed, pattern: Pattern, parameters: Numbers) -> bool:
     """Whether a located multiple root has several eigenvectors, so that it is no exceptional point."""
     return any(not m.exceptional for m in located_meetings(problem, pattern, parameters))
 
 
-def located_meetings(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> tuple[MultipleRoot, ...]:
+def located_meetings(problem: Posed, pattern: Pattern, parameters: Numbers) -> tuple[MultipleRoot, ...]:
     """The multiple roots of a pattern with ``EP`` in its name; none without matrices."""
     if problem.model.pencil is None or "EP" not in pattern.name:
         return ()
     return meetings(problem, parameters, _located_roots(problem, pattern, parameters))
 
 
-def _located_roots(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> list[Root]:
+def _located_roots(problem: Posed, pattern: Pattern, parameters: Numbers) -> list[Root]:
     """The multiple roots of the nearest polynomial of a pattern."""
-    values = problem.values(parameters)
     try:
-        (unknowns, *_) = fit_unknowns(pattern, np.array([float(c) for c in values.coefficients]))
+        (unknowns, *_) = fit_unknowns(pattern, np.array([float(c) for c in problem.values(parameters).coefficients]))
     except ValueError:
         return []
     return [
@@ -64,7 +63,7 @@ def _located_roots(problem: Posed, pattern: Pattern, parameters: Mapping[str, fl
 
 
 def every_meeting(
-    problem: Posed, parameters: Mapping[str, float], roots: Sequence[Root], violated: Collection[str]
+    problem: Posed, parameters: Numbers, roots: Sequence[Root], violated: Collection[str]
 ) -> tuple[MultipleRoot, ...]:
     """The multiple roots of a solution: first those of its pattern, unless it is violated, then the others."""
     shown, pattern = meetings(problem, parameters, roots), problem.pattern
@@ -84,7 +83,7 @@ def _number(root: Root | MultipleRoot) -> complex:
     return complex(root.re, root.im)
 
 
-def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> dict[str, float]:
+def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Numbers) -> dict[str, float]:
     """The parameters near a design where its located roots cross, more accurate than from coefficients."""
     roots = _located_roots(problem, pattern, parameters)
     root = max(roots, key=lambda r: r.multiplicity)
@@ -93,15 +92,14 @@ def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Mapping[str, 
 
 
 def _find_eigenvectors(
-    problem: Posed, parameters: Mapping[str, float], root: Root, user_root: Root, roots: Sequence[Root]
+    problem: Posed, parameters: Numbers, root: Root, user_root: Root, roots: Sequence[Root]
 ) -> MultipleRoot:
     k, pencil = root.multiplicity, problem.model.pencil
     if pencil is None:
         return MultipleRoot(user_root.re, user_root.im, k, None, k)
-    of = problem.parameter_set
     unit = _unit(root, roots)
     at, s = _find_crossing(problem, parameters, _number(root), k, unit)
-    matrices = pencil(of.native({n: flint.arb(x) for n, x in at.items()}))
+    matrices = pencil(problem.parameter_set.native({n: flint.arb(x) for n, x in at.items()}))
     found = jordan(matrices, flint.acb(s.real, s.imag), k, _RANK, unit)
     partial = found.partial or (k - found.geometric + 1,)
     return MultipleRoot(user_root.re, user_root.im, k, found.geometric, partial[0])
@@ -112,65 +110,54 @@ def _unit(root: Root, roots: Sequence[Root]) -> float:
     return max(abs(_number(root)), _UNIT * max(abs(_number(r)) for r in roots)) or 1.0
 
 
-def _find_crossing(
-    problem: Posed, parameters: Mapping[str, float], s: complex, k: int, unit: float
-) -> tuple[Mapping[str, float], complex]:
+def _find_crossing(problem: Posed, parameters: Numbers, s: complex, k: int, unit: float) -> tuple[Numbers, complex]:
     """The crossing near a design and its root; the design itself if there is none nearby.
 
     Coefficients determine a crossing to half of their digits only, so the design may be 1e-5 away from it. At the
     crossing the block of L(s) of the least singular values vanishes, which is a regular equation in the parameters.
     """
     free = [n for n, (low, high) in problem.free.items() if high > low]
-    widths = np.array([problem.free[n][1] - problem.free[n][0] for n in free])
+    start = np.array([*(float(parameters[n]) for n in free), s.real, s.imag])
+    widths = np.array([*(problem.free[n][1] - problem.free[n][0] for n in free), unit, unit])
     size, scale = equilibrate(_matrices(problem, parameters), unit)
     scale = scale / np.linalg.norm(size * scale, 2)  # constant, so that it does not jump with the entries
 
     def design_at(x: Array) -> dict[str, float]:
-        return {**parameters, **dict(zip(free, x.tolist(), strict=True))}
+        return {**parameters, **dict(zip(free, x.tolist(), strict=False))}
 
-    def scaled_matrix(x: Array, z: complex) -> Complex:
-        matrices = _matrices(problem, design_at(x))
-        whole = sum(P * z ** (len(matrices) - 1 - j) for j, P in enumerate(matrices))
-        return np.asarray(scale * whole, dtype=complex)
+    def scaled_matrix(x: Array) -> Complex:
+        found = np.polyval(_matrices(problem, design_at(x)), complex(*x[-2:]))
+        return np.asarray(scale * found, dtype=complex)
 
     for count in range(k, 1, -1):
-        x, z = np.array([float(parameters[n]) for n in free]), s
+        x = start
         for _ in range(_STEPS):
-            left, values, right = np.linalg.svd(scaled_matrix(x, z))
+            left, values, right = np.linalg.svd(scaled_matrix(x))
             if count > len(values) or values[-count] > _CLOSE:
                 break
             if values[-count] <= _VANISHED:
-                return design_at(x), z
-            step = _newton_step(scaled_matrix, x, widths, z, unit, left[:, -count:], right[-count:])
-            x, z = x + widths * step[:-2], z + unit * complex(*step[-2:])
-            if (np.abs(x - [parameters[n] for n in free]) > _REACH * widths).any():
+                return design_at(x), complex(*x[-2:])
+            x = x + widths * _newton_step(scaled_matrix, x, widths, left[:, -count:], right[-count:])
+            if (np.abs(x - start) > _REACH * widths)[:-2].any():
                 break
     return parameters, s
 
 
-def _matrices(problem: Posed, parameters: Mapping[str, float]) -> list[Array]:
+def _matrices(problem: Posed, parameters: Numbers) -> list[Array]:
     assert problem.model.pencil is not None
     found = problem.model.pencil(problem.parameter_set.native(dict(parameters)))
     return [np.array(P, dtype=float) for P in found]
 
 
 def _newton_step(
-    scaled_matrix: Callable[[Array, complex], Complex],
-    x: Array,
-    widths: Array,
-    z: complex,
-    unit: float,
-    left: Complex,
-    right: Complex,
+    scaled_matrix: Callable[[Array], Complex], x: Array, widths: Array, left: Complex, right: Complex
 ) -> Array:
     """A Gauss–Newton step towards a vanishing block of L, in shares of the box and of the unit of the root."""
 
-    def block(at: Array, root: complex) -> Array:
-        B = (left.conj().T @ scaled_matrix(at, root) @ right.conj().T).ravel()
+    def block(at: Array) -> Array:
+        B = (left.conj().T @ scaled_matrix(at) @ right.conj().T).ravel()
         return np.concatenate([B.real, B.imag])
 
-    base = block(x, z)
-    moves = [*(widths * row for row in np.eye(len(x))), *np.zeros((2, len(x)))]
-    turns = [*([0.0] * len(x)), unit, 1j * unit]
-    columns = [(block(x + _STEP * m, z + _STEP * t) - base) / _STEP for m, t in zip(moves, turns, strict=True)]
+    base = block(x)
+    columns = [(block(x + _STEP * move) - base) / _STEP for move in np.diag(widths)]
     return np.asarray(np.linalg.lstsq(np.array(columns).T, -base, rcond=1e-9)[0])
