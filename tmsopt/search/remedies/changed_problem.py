@@ -1,5 +1,6 @@
-"""A problem with changed limits, solved again."""
+"""A problem with changed limits, solved again within the time that advice may take."""
 
+import time
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ from tmsopt.problem.dependence import stability_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import Starts
 from tmsopt.program.options import Options
+from tmsopt.progress import Progress, Steps
 from tmsopt.search.outcome import Outcome, assess_best, has_runaway_root, is_better_outcome
 from tmsopt.search.policy import run_nested
 from tmsopt.search.search import POLICY, search_nested
@@ -17,6 +19,25 @@ from tmsopt.search.stopping import count_starts
 
 _FEW_STARTS = 6  # of a problem with changed limits
 _LEAST_DECAY = 1e-6  # of the roots' mean size: a design that decays this fast counts as stable
+_SECONDS = 2.5  # least allowance, of process time: enough to solve a problem with seven free parameters again
+_SHARE = 0.3  # allowance as a share of the time spent before
+
+
+class OutOfTime(Exception):
+    """Raised when the allowance is used up."""
+
+
+def limit_time(options: Options, spent: float = 0.0) -> Options:
+    """A copy of the options with which work raises `OutOfTime` once its allowance is used up."""
+    end = time.process_time() + max(_SECONDS, _SHARE * spent)
+
+    def check_time(_: Progress) -> None:
+        if time.process_time() > end:
+            raise OutOfTime
+
+    steps = Steps(check_time)
+    steps.begin("solving again", "start")
+    return replace(options, progress=steps, near=None)
 
 
 def solve_again(

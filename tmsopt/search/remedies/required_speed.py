@@ -14,8 +14,7 @@ from tmsopt.problem.unit_system import unit_of
 from tmsopt.program.options import Options
 from tmsopt.progress import begin
 from tmsopt.records import Table
-from tmsopt.search.remedies.allowance import OutOfTime, limit_time
-from tmsopt.search.remedies.changed_problem import solve_again
+from tmsopt.search.remedies.changed_problem import OutOfTime, limit_time, solve_again
 from tmsopt.search.remedies.conflict import STARTS, search_briefly
 from tmsopt.search.state import begin_search
 
