@@ -14,7 +14,6 @@ from tmsopt.program.nlp import NLP
 from tmsopt.progress import begin
 from tmsopt.search.acceptance import is_better
 from tmsopt.search.sample import Sample
-from tmsopt.search.starts import is_led
 from tmsopt.search.state import LocalEnd, SearchState, Start
 from tmsopt.search.tuning import TUNING, Tuning
 
@@ -122,7 +121,7 @@ def try_starts(state: SearchState, starts: Iterable[Start], policy: Policy, most
     most = most or state.options.starts
     whole = (replace(start, design={**default_start(state.part), **start.design}) for start in starts)
     try:
-        for tried, start in enumerate((s for s in whole if not is_led(state, s)), start=1):
+        for tried, start in enumerate((s for s in whole if not any(s.row in end.led for end in state.ends)), start=1):
             state = replace(state, ends=(*state.ends, policy.local(state, start)))
             if state.options.progress:
                 state.options.progress(tried, most, state.so_far)

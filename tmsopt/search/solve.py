@@ -8,6 +8,7 @@ from functools import partial
 from typing import Unpack
 
 from tmsopt.boundaries import find_edges, is_exactly_multiple
+from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.evaluation.exclusion import bound_without_search
 from tmsopt.evaluation.recheck import Evaluation
@@ -39,7 +40,7 @@ from tmsopt.search.policy import Policy, check_policy
 from tmsopt.search.remedies.infeasible import explain_infeasible
 from tmsopt.search.remedies.required_speed import add_required_speed
 from tmsopt.search.search import POLICY, search_part
-from tmsopt.search.state import SearchState, begin_search, check_near, same_objective
+from tmsopt.search.state import SearchState, begin_search, same_objective
 from tmsopt.search.stopping import count_starts
 
 UNSTABLE = "no stable design was found that meets the other limits"
@@ -114,7 +115,7 @@ def solve_any_status(
     if not problem.free:
         return add_cover(_assemble(problem, assess_design(problem, {}, fixed=True), (), {}, began, bound))
     if options.near:
-        check_near(problem, options.near)
+        _check_near(problem, options.near)
         near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
         options = replace(options, near=near)
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
@@ -150,6 +151,20 @@ def solve_any_status(
             raise
         words = "the user stopped the search for a stable design"
         return replace(solution, interrupted=True, notes=(*solution.notes, words))
+
+
+def _check_near(problem: Posed, near: Mapping[str, float]) -> None:
+    """Check that a design to start near names parameters and has numbers.
+
+    Raises:
+        InputError: with all faults.
+    """
+    names = problem.parameter_set.names
+    faults = [Fault(f"unknown parameter '{n}'; {suggest(str(n), names)}", ("near",)) for n in near if n not in names]
+    wrong = (n for n, value in near.items() if not is_number(value))
+    faults += [Fault(f"found {short(near[n])}; accepted: a finite number", ("near", n)) for n in wrong]
+    if faults:
+        raise InputError(faults)
 
 
 def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[SearchedPart]:

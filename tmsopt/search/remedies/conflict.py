@@ -11,7 +11,7 @@ from tmsopt.problem.quantities import RADIUS
 from tmsopt.program.options import Options
 from tmsopt.search.policy import run_nested
 from tmsopt.search.search import POLICY, search_nested
-from tmsopt.search.state import CheckedEnd, SearchState, begin_search
+from tmsopt.search.state import CheckedEnd, SearchState, begin_search, is_inside
 
 STARTS = 6
 """Starts of a short search."""
@@ -81,7 +81,7 @@ class _FeasibilityCheck:
         free = self.problem.free
         rest = {n: text for n, text in self.problem.constraints.items() if n in names}
         part = self.problem.derive(constraints=rest, free={**free, **ends})
-        if any(_is_inside(part, d) and _is_feasible(part, part.ordered(d)) for d in self.designs):
+        if any(is_inside(part, d) and _is_feasible(part, part.ordered(d)) for d in self.designs):
             return True
         key = (tuple(rest), tuple(ends.items()))
         if key not in self.results and len(self.results) < _MOST_SEARCHES:
@@ -149,11 +149,6 @@ def search_briefly(state: SearchState) -> CheckedEnd | None:
     if state.out_of_reach:
         return None
     return run_nested(state, POLICY.starts(state), POLICY, STARTS).best
-
-
-def _is_inside(problem: Posed, design: Mapping[str, float]) -> bool:
-    """Whether a design is in the box."""
-    return all(lower <= design[n] <= upper for n, (lower, upper) in problem.free.items())
 
 
 def _is_feasible(problem: Posed, design: Mapping[str, float]) -> bool:
