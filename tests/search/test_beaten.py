@@ -38,7 +38,7 @@ def test_no_optimum_stands_that_an_end_beats(found, between, status, value):
     state = replace(state, sample=tmsopt.POLICY.sample(state))
     ends = {at: tmsopt.POLICY.local(state, tmsopt.Start({"x": at})) for at in (LEFT, RIGHT)}
     one = tmsopt.POLICY.accept(replace(state, ends=(ends[found],)))
-    own = import_module("tmsopt.search.worst_cases").cover_cases(one, tmsopt.POLICY)
+    own = import_module("tmsopt.search.search").cover_cases(one, tmsopt.POLICY, tmsopt.Starts())
     assert own.status == "optimal"
     left = import_module("tmsopt.search.outcome").demote_if_beaten(replace(one, ends=tuple(ends.values())), own)
     assert left.status == status
