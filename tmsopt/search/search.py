@@ -27,7 +27,7 @@ from tmsopt.search.policy import Policy, disable_stopping, search, try_starts
 from tmsopt.search.radius import RADIUS_POLICY
 from tmsopt.search.rescues import RESCUES
 from tmsopt.search.starts import propose_starts, sample_part
-from tmsopt.search.state import CheckedEnd, SearchState, Start, same_objective
+from tmsopt.search.state import CheckedEnd, SearchState, Start, is_close, same_objective
 from tmsopt.search.stopping import count_starts, is_enough, select_distinct_ends
 
 POLICY = Policy(sample_part, propose_starts, solve_from, accept_best, is_enough, RESCUES)
@@ -158,9 +158,9 @@ def _find_nearer_boundary(trial: CheckedEnd, least: float) -> list[Case]:
 def _select_apart(problem: Posed, designs: Sequence[Mapping[str, float]], share: float) -> list[Mapping[str, float]]:
     """The designs without those that nearly equal an earlier one."""
     kept: list[Mapping[str, float]] = []
-    for d in designs:
-        if not any(all(abs(d[n] - k[n]) <= share * (hi - lo) for n, (lo, hi) in problem.free.items()) for k in kept):
-            kept.append(d)
+    for design in designs:
+        if not any(is_close(problem, design, other, share) for other in kept):
+            kept.append(design)
     return kept
 
 

@@ -265,6 +265,11 @@ def is_inside(problem: Posed, design: Mapping[str, float]) -> bool:
     return all(lower <= design.get(n, lower) <= upper for n, (lower, upper) in problem.free.items())
 
 
+def is_close(problem: Posed, one: Mapping[str, float], other: Mapping[str, float], share: float) -> bool:
+    """Whether no free parameter differs by more than a share of its range."""
+    return all(abs(one[n] - other[n]) <= share * (upper - lower) for n, (lower, upper) in problem.free.items())
+
+
 def clip_to_box(problem: Posed, design: Mapping[str, float]) -> dict[str, float]:
     """The free parameters of a design, moved into their ranges."""
     return {n: min(max(design[n], low), high) for n, (low, high) in problem.free.items()}
