@@ -136,7 +136,16 @@ def write_mass_advice(problem: Posed) -> str:
     return f"keep {known.get(problem.model.name, 'a0')} away from 0 by a constraint"
 
 
-def is_better_outcome(problem: Posed, one: Outcome, other: Outcome, tuning: Tuning) -> bool:
+def choose_outcome(problem: Posed, outcomes: Sequence[Outcome | None], tuning: Tuning) -> Outcome | None:
+    """The best outcome; None if there is none."""
+    best: Outcome | None = None
+    for outcome in outcomes:
+        if outcome and (best is None or _is_better(problem, outcome, best, tuning)):
+            best = outcome
+    return best
+
+
+def _is_better(problem: Posed, one: Outcome, other: Outcome, tuning: Tuning) -> bool:
     """Whether one outcome beats another: feasible first, then by objective, then optimal first."""
     a, b = (problem.sign * outcome.checked.objective for outcome in (one, other))
     sound = not (one.checked.violations or other.checked.violations)

@@ -11,7 +11,7 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.searches import Starts
 from tmsopt.program.options import Options
 from tmsopt.progress import Progress, Steps
-from tmsopt.search.outcome import Outcome, assess_best, has_runaway_root, is_better_outcome
+from tmsopt.search.outcome import Outcome, assess_best, choose_outcome, has_runaway_root
 from tmsopt.search.policy import run_nested
 from tmsopt.search.search import POLICY, search_nested
 from tmsopt.search.state import SearchState, begin_search
@@ -49,13 +49,10 @@ def solve_again(
     stable, unless `thorough`. Otherwise the whole search runs.
     """
     stable = _require_stability(problem, original)
-    best: Outcome | None = None
-    for state in begin_search(problem, options):
-        outcome = None if problem.cases else _search_few_starts(state, stable, thorough)
-        outcome = outcome or search_nested(state)
-        best = (
-            outcome if outcome and (best is None or is_better_outcome(problem, outcome, best, state.tuning)) else best
-        )
+    states = begin_search(problem, options)
+    few = [None if problem.cases else _search_few_starts(state, stable, thorough) for state in states]
+    outcomes = [outcome or search_nested(state) for state, outcome in zip(states, few, strict=True)]
+    best = choose_outcome(problem, outcomes, states[0].tuning)
     if best is None or best.status != "optimal":
         return None
     return best.parameters if _is_met(stable, best) else {}
