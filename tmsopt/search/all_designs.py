@@ -10,15 +10,13 @@ import numpy as np
 
 from tmsopt.errors import input_error, is_number, short
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.global_search.completeness import SECONDS, Completeness, prove_completeness
-from tmsopt.problem.files import Given, pose
-from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.problem.problem import Posed
-from tmsopt.problem.solution import Solution
+from tmsopt.global_search import Completeness, prove_completeness
+from tmsopt.global_search.completeness import SECONDS
+from tmsopt.problem import Given, Posed, Solution, degrees_of_freedom, pose
 from tmsopt.problem.validate import SMALLEST
-from tmsopt.program.formulate import design_of, formulate_matching
-from tmsopt.program.nlp import NLP
-from tmsopt.program.options import CommonOptions, Options, documents_options, make_options
+from tmsopt.program import NLP, CommonOptions, Options, formulate_matching, make_options
+from tmsopt.program.formulate import design_of
+from tmsopt.program.options import documents_options
 from tmsopt.program.starts import complete_starts, sample_box
 from tmsopt.progress import begin
 from tmsopt.records import Array, Table, Tabular, plain

@@ -7,9 +7,8 @@ from itertools import islice
 import numpy as np
 
 from tmsopt.problem.verdict.meetings import is_crossing
+from tmsopt.program import NLP, initial_point
 from tmsopt.program.ipopt import make_ipopt
-from tmsopt.program.nlp import NLP
-from tmsopt.program.starts import initial_point
 from tmsopt.records import Array
 from tmsopt.roots import roots
 from tmsopt.search.state import LocalEnd, SearchState, Start

@@ -6,19 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tmsopt.evaluation import find_worst_cases
 from tmsopt.evaluation.bound import instant_bound, minimizes_abscissa
 from tmsopt.evaluation.recheck import Evaluation, recheck
-from tmsopt.evaluation.worst_case import Worst, find_worst_cases
-from tmsopt.problem.advice.remedies import Relaxation
-from tmsopt.problem.cases import Case
-from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.problem.problem import Posed
-from tmsopt.problem.searches import Starts
+from tmsopt.evaluation.worst_case import Worst
+from tmsopt.problem import Case, Posed, Relaxation, Starts, degrees_of_freedom
 from tmsopt.problem.solution import OtherBranch
-from tmsopt.program.formulate import formulate_abscissa, formulate_matching
+from tmsopt.program import NLP, choose_starts, formulate_abscissa, formulate_matching, initial_point
 from tmsopt.program.ipopt import Point, relaxation_gain
-from tmsopt.program.nlp import NLP
-from tmsopt.program.starts import choose_starts, initial_point
 from tmsopt.records import Array, Table
 from tmsopt.roots import Root
 from tmsopt.search.acceptance import claim_matches, has_converged, recheck_inside_box

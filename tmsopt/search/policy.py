@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tmsopt.errors import Fault, InputError, input_error, short, suggest
+from tmsopt.program import NLP
 from tmsopt.program.formulate import default_start
-from tmsopt.program.nlp import NLP
 from tmsopt.progress import begin
 from tmsopt.search.acceptance import is_better
 from tmsopt.search.sample import Sample

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from tmsopt.boundaries.nearest import Robustness, find_stability_margins
-from tmsopt.problem.cases import Case, weight_of
+from tmsopt.boundaries import Robustness, find_stability_margins
+from tmsopt.problem import Case, Posed
+from tmsopt.problem.cases import weight_of
 from tmsopt.problem.evaluate import coefficients_of
-from tmsopt.problem.problem import Posed, radius_parameters
+from tmsopt.problem.problem import radius_parameters
 from tmsopt.problem.quantities import RADIUS
 from tmsopt.program.formulate import formulate
 from tmsopt.records import Array, Table

@@ -11,9 +11,9 @@ import numpy as np
 
 from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.models.user_spectrum import full_patterns
-from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.program.formulate import formulate, formulate_matching
-from tmsopt.program.starts import choose_starts
+from tmsopt.problem import degrees_of_freedom
+from tmsopt.program import choose_starts, formulate_matching
+from tmsopt.program.formulate import formulate
 from tmsopt.search.acceptance import check_end, claim_matches, is_better, is_sound
 from tmsopt.search.local_search import run_once
 from tmsopt.search.outcome import KEPT, has_runaway_root, write_mass_advice

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.algebra.sequence import golden_steps
+from tmsopt.problem import Posed
 from tmsopt.problem.evaluate import coefficients_of
-from tmsopt.problem.problem import Posed
 from tmsopt.program.design_scores import DesignScores, score_designs
 from tmsopt.program.unit_box import UnitBox
 from tmsopt.records import Array

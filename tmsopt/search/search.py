@@ -4,13 +4,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from tmsopt.evaluation import find_worst_cases
 from tmsopt.evaluation.recheck import FEASIBLE
-from tmsopt.evaluation.worst_case import Worst, find_worst_cases
-from tmsopt.problem.cases import Case
+from tmsopt.evaluation.worst_case import Worst
+from tmsopt.problem import Case, Posed, Starts
 from tmsopt.problem.dependence import WORSE_DIRECTION
-from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS
-from tmsopt.problem.searches import Starts
 from tmsopt.program.formulate import formulate
 from tmsopt.records import Table
 from tmsopt.search.acceptance import accept_best, is_better

@@ -8,34 +8,23 @@ from typing import Unpack
 
 from tmsopt.boundaries import find_edges, is_exactly_multiple
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
+from tmsopt.evaluation import missed_note, prove_worst_case
 from tmsopt.evaluation.bound import minimizes_abscissa
 from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.evaluation.exclusion import bound_without_search
 from tmsopt.evaluation.recheck import Evaluation
-from tmsopt.evaluation.stored import find_storable_design, missed_note
-from tmsopt.evaluation.worst_case import prove_worst_case
+from tmsopt.evaluation.stored import find_storable_design
 from tmsopt.models.user_spectrum import beyond_axis, polynomial_structure, remove_rounding, user_structure_name
+from tmsopt.problem import Bound, Given, NotSolved, Posed, Solution, as_solvable, degrees_of_freedom, unit_at, unit_of
 from tmsopt.problem.dependence import sense_notes
-from tmsopt.problem.files import Given, as_solvable
-from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
-from tmsopt.problem.solution import Bound, Solution
-from tmsopt.problem.unit_system import unit_at, unit_of
 from tmsopt.problem.verdict.meetings import every_meeting
 from tmsopt.problem.verdict.stability import stability
-from tmsopt.problem.verdict.status import NotSolved
-from tmsopt.program.nlp import objective_size
-from tmsopt.program.options import DEFAULTS, Options, SolveOptions, documents_options, make_options
+from tmsopt.program import DEFAULTS, Options, SolveOptions, make_options, objective_size
+from tmsopt.program.options import documents_options
 from tmsopt.progress import Listener, begin, steps_for
 from tmsopt.records import Table
-from tmsopt.search.outcome import (
-    UNCLEAR,
-    Outcome,
-    assess_design,
-    choose_outcome,
-    write_mass_advice,
-)
+from tmsopt.search.outcome import UNCLEAR, Outcome, assess_design, choose_outcome, write_mass_advice
 from tmsopt.search.policy import Policy, check_policy
 from tmsopt.search.remedies.infeasible import explain_infeasible
 from tmsopt.search.remedies.required_speed import add_required_speed

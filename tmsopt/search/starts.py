@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from itertools import zip_longest
 
-from tmsopt.program.starts import choose_starts
+from tmsopt.program import choose_starts
 from tmsopt.search.sample import Sample, sample_box
 from tmsopt.search.state import SearchState, Start, is_inside
 

@@ -8,11 +8,10 @@ from functools import lru_cache
 import numpy as np
 
 from tmsopt.evaluation.recheck import Evaluation, recheck
-from tmsopt.problem.problem import Posed
+from tmsopt.problem import Posed
+from tmsopt.program import DEFAULTS, NLP, Options
 from tmsopt.program.formulate import design_of, formulate
 from tmsopt.program.ipopt import Point, Run
-from tmsopt.program.nlp import NLP
-from tmsopt.program.options import DEFAULTS, Options
 from tmsopt.records import Array
 from tmsopt.search.sample import Sample, sample_box
 from tmsopt.search.tuning import TUNING, Tuning

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from tmsopt.evaluation.bound import instant_bound, is_gap_closed, minimizes_abscissa
-from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.problem.searches import Starts
+from tmsopt.problem import Starts, degrees_of_freedom
 from tmsopt.search.state import LocalEnd, SearchState, same_objective
 from tmsopt.search.tuning import TUNING
 

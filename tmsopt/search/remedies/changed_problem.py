@@ -6,10 +6,9 @@ from dataclasses import replace
 
 from tmsopt.evaluation.bound import minimizes_abscissa
 from tmsopt.evaluation.recheck import recheck
+from tmsopt.problem import Posed, Starts
 from tmsopt.problem.dependence import stability_limit
-from tmsopt.problem.problem import Posed
-from tmsopt.problem.searches import Starts
-from tmsopt.program.options import Options
+from tmsopt.program import Options
 from tmsopt.progress import Progress, Steps
 from tmsopt.search.outcome import Outcome, assess_best, choose_outcome, has_runaway_root
 from tmsopt.search.policy import run_nested

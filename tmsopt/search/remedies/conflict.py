@@ -3,12 +3,11 @@
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from tmsopt.evaluation import find_worst_cases
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.evaluation.worst_case import find_worst_cases
-from tmsopt.problem.advice.remedies import Relaxation
-from tmsopt.problem.problem import Posed
+from tmsopt.problem import Posed, Relaxation
 from tmsopt.problem.quantities import RADIUS
-from tmsopt.program.options import Options
+from tmsopt.program import Options
 from tmsopt.search.policy import run_nested
 from tmsopt.search.search import POLICY, search_nested
 from tmsopt.search.state import CheckedEnd, SearchState, begin_search, is_inside

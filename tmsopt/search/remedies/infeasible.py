@@ -11,13 +11,12 @@ import numpy as np
 
 from tmsopt.errors import InputError
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.problem.advice.remedies import DIGITS, Relaxation, move_limits, replace_limits
+from tmsopt.problem import Posed, Relaxation, Starts, move_limits, replace_limits
+from tmsopt.problem.advice.remedies import DIGITS
 from tmsopt.problem.dependence import STABLE, stability_limit
-from tmsopt.problem.problem import Posed
-from tmsopt.problem.searches import Starts
 from tmsopt.problem.verdict.meetings import nearest_crossing
+from tmsopt.program import Options
 from tmsopt.program.formulate import default_start, formulate
-from tmsopt.program.options import Options
 from tmsopt.progress import begin
 from tmsopt.records import Table
 from tmsopt.search.outcome import Outcome, assess_best, assess_design, write_mass_advice

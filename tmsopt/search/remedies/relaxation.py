@@ -6,17 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import fold, formula, symbol
-from tmsopt.algebra.kinds import NODES, atan
+from tmsopt.algebra import NODES, fold
+from tmsopt.algebra.formula import formula, symbol
+from tmsopt.algebra.kinds import atan
+from tmsopt.evaluation import find_worst_cases
 from tmsopt.evaluation.recheck import FEASIBLE, measure_excesses, recheck
-from tmsopt.evaluation.worst_case import find_worst_cases
 from tmsopt.models import Values
-from tmsopt.problem.advice.remedies import Relaxation
-from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Posed
+from tmsopt.problem import Case, Posed, Relaxation
+from tmsopt.program import NLP, Options
 from tmsopt.program.formulate import formulate
-from tmsopt.program.nlp import NLP, AddedVariable, variable_name
-from tmsopt.program.options import Options
+from tmsopt.program.nlp import AddedVariable, variable_name
 from tmsopt.records import Table
 from tmsopt.search.policy import disable_stopping, run_nested
 from tmsopt.search.sample import Box, Sample, draw_box

@@ -6,12 +6,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 
+from tmsopt.problem import Posed, Solution, unit_of
 from tmsopt.problem.advice.remedies import DIGITS, RequiredValue, round_outwards
 from tmsopt.problem.dependence import STABLE
-from tmsopt.problem.problem import Posed
-from tmsopt.problem.solution import Solution
-from tmsopt.problem.unit_system import unit_of
-from tmsopt.program.options import Options
+from tmsopt.program import Options
 from tmsopt.progress import begin
 from tmsopt.records import Table
 from tmsopt.search.remedies.changed_problem import OutOfTime, limit_time, solve_again
