@@ -18,7 +18,7 @@ from tmsopt.search.acceptance import check_end, claim_matches, is_better, is_sou
 from tmsopt.search.local_search import run_once
 from tmsopt.search.outcome import KEPT, has_runaway_root, write_mass_advice
 from tmsopt.search.policy import Policy, Rescue, disable_stopping, search_again, try_starts
-from tmsopt.search.sample import DesignBatch, sample_box
+from tmsopt.search.sample import DesignBatch, sample_box, stream
 from tmsopt.search.starts import propose_sample_starts
 from tmsopt.search.state import CheckedEnd, Fallback, SearchState, Start
 from tmsopt.search.stopping import select_distinct_ends
@@ -158,7 +158,7 @@ def _propose_near_designs(
     assert state.sample is not None
     box, tuning = state.sample.box, state.tuning
     own = box.space.points(design)
-    random = box.stream("aside").random((tuning.towards, len(own)))
+    random = stream(box.seed, "aside").random((tuning.towards, len(own)))
     towards = np.concatenate([state.sample.refined.u[: tuning.rivals_seen], random])
     seen = box.judge_points((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, len(own)))
     close = (seen.violation == 0) & (np.abs(seen.objective - objective) <= tuning.edge * (1 + abs(objective)))
@@ -217,7 +217,8 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
     assert state.sample is not None
     tuning, box, best = state.tuning, state.sample.box, state.best
     rivals = (find_rivals(state) or state.sample.refined).join(find_singular_rivals(state))
-    few = np.unique([*range(len(rivals))][: tuning.open] + [*range(len(rivals))][-tuning.open :])
+    rows = np.arange(len(rivals))
+    few = np.union1d(rows[: tuning.open], rows[-tuning.open :])
     starts = [Start(design) for design in box.designs(rivals.take(few))]
     starts += [Start(best.parameters)] if best else []
     starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.take_first(tuning.open))]
@@ -230,11 +231,11 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
         reached = min(own.feasible, key=lambda end: end.objective, default=None)
         if reached is None or not reached.objective < least:
             continue
-        rows = [k for k, name in enumerate(nlp.rows) if name == "a0"]
-        singular = bool(nlp.evaluate(reached.run.x)[1][rows].min() < tuning.singular)
+        leads = np.array(nlp.rows) == "a0"
+        singular = bool(nlp.evaluate(reached.run.x)[1][leads].min() < tuning.singular)
         if singular:
-            lower = tuple(tuning.inside if k in rows else limit for k, limit in enumerate(nlp.row_lower))
-            own = state.with_program(replace(nlp, row_lower=lower))
+            lower = np.where(leads, tuning.inside, nlp.row_lower)
+            own = state.with_program(replace(nlp, row_lower=tuple(lower.tolist())))
             own = try_starts(own, [Start(state.design_at(reached))], disable_stopping(policy))
         own = policy.accept(own)
         if own.best is None or own.best.checked.violations or has_merged_roots(own.best):
