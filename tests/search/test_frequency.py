@@ -170,7 +170,7 @@ def decay_and_frequency(design):
 )
 def test_no_search_finds_a_better_skate(sense, expression, limits, merit, violation):
     design = tmsopt.solve(asked(constraints=limits, **{sense: expression}))
-    own = decay_and_frequency({n: np.asarray(design.parameters[n]) for n in BOX})
+    own = decay_and_frequency({n: design.parameters[n] for n in BOX})
     value = float(merit(design.parameters, *own))
     assert value == pytest.approx(design.value if sense == "minimize" else -design.value, abs=TOLERANCE)
     assert violation(*own) <= TOLERANCE

@@ -98,7 +98,7 @@ def test_answer_is_attained_and_no_search_does_better(name):
     sense, expression, constraints, merit, violation = QUESTIONS[name]
     design = tmsopt.solve(skate(constraints={f"c{k}": c for k, c in enumerate(constraints)}, **{sense: expression}))
     sign = -1 if sense == "maximize" else 1
-    own = {n: np.asarray(v) for n, v in design.parameters.items()}
+    own = dict(design.parameters)
     assert float(merit(own)) == pytest.approx(sign * design.value, abs=SCATTER * (1 + abs(design.value)))
     assert float(violation(own)) <= SCATTER
     seeds = (1, 31) if name == "sways least at its speed" else (1,)  # one ends in a lesser optimum
@@ -146,7 +146,7 @@ def test_an_equality_of_the_abscissa():
     """The optimum is an EP3, where eigenvalues are off by 1e-5: the search is allowed 1e-4, and so is no proof of more."""
     design = tmsopt.solve(skate(minimize="lambda_s", constraints={"decay": "abscissa == -0.7"}))
     assert design.abscissa == pytest.approx(-0.7, abs=1e-11)  # moved until the stored design meets it, to 1e-9
-    own = {n: np.asarray(v) for n, v in design.parameters.items()}
+    own = dict(design.parameters)
     assert abscissa(own) == pytest.approx(-0.7, abs=1e-4)
     assert design.value <= least_tilt(-0.7) + 1e-9
     assert design.value == pytest.approx(least_tilt(-0.7), abs=2e-3)  # a cusp: the grid sees it from one side
