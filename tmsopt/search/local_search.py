@@ -17,8 +17,7 @@ from tmsopt.search.stopping import is_proven
 
 def solve_from(state: SearchState, start: Start) -> LocalEnd:
     """Solve from one start; if IPOPT does not converge, factor the roots anew and go on while that helps."""
-    tuning, nlp = state.tuning, state.nlp
-    exact = bool(nlp.cases) and nlp.exact
+    tuning, exact = state.tuning, state.nlp.cases and state.nlp.exact
     best = run_once(state, start, "near" if start.near else "exact" if exact else "far")
     for again in range(tuning.restarts):
         converged = (

@@ -94,10 +94,8 @@ def check_policy(policy: Any) -> None:
         raise input_error(f"found {short(policy)}; accepted: a tmsopt.Policy, such as tmsopt.POLICY", "policy")
     stages = {name: getattr(policy, name) for name in ("sample", "starts", "local", "accept", "enough")}
     wrong = {name: stage for name, stage in stages.items() if not callable(stage)}
-    if wrong:
-        raise InputError(
-            [Fault(f"found {short(stage)}; accepted: a function", ("policy", n)) for n, stage in wrong.items()]
-        )
+    if faults := [Fault(f"found {short(x)}; accepted: a function", ("policy", name)) for name, x in wrong.items()]:
+        raise InputError(faults)
 
 
 def search(state: SearchState, policy: Policy) -> SearchState:

@@ -26,11 +26,6 @@ from tmsopt.search.stopping import select_distinct_ends
 # Roots that meet
 
 
-def has_both_root_limits(state: SearchState) -> bool:
-    """Whether abscissa and damping ratio are both variables: their factors are singular where real roots meet."""
-    return {"abscissa", "damping_ratio"} <= set(state.nlp.variables)
-
-
 def search_real_roots(state: SearchState, policy: Policy) -> SearchState:
     """Search with all roots real; start from designs of least abscissa with one multiple root, if there are any."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=1.0)
@@ -71,8 +66,17 @@ def can_have_positive_roots(state: SearchState) -> bool:
 def search_positive_roots(state: SearchState, policy: Policy) -> SearchState:
     """Search with a damping ratio of −1, without a sector."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=-1.0)
-    few = (state.best and state.nlp.contacts) or (state.problem.maximize or "").strip() == "damping_ratio"
+    few = (state.best and state.nlp.contacts) or (state.problem.sense, state.problem.goal) == (
+        "maximize",
+        "damping_ratio",
+    )
     return search_again(state, policy, nlp=nlp, most=state.tuning.fewer if few else 0)
+
+
+def has_only_crossings(state: SearchState) -> bool:
+    """Whether starts for a pattern with freedom ended only where roots meet without a Jordan chain."""
+    crossing, best = any(end.crossing for end in state.ends), state.best
+    return crossing and (not best or bool(best.checked.violations)) and degrees_of_freedom(state.problem).count > 0
 
 
 def search_other_chains(state: SearchState, policy: Policy) -> SearchState:
@@ -239,8 +243,8 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
             own = try_starts(own, [Start(state.design_at(reached))], disable_stopping(policy))
         own = policy.accept(own)
         if own.best is None or own.best.checked.violations or has_merged_roots(own.best):
-            near = best is not None and has_runaway_root(best.checked.structure.roots, tuning.far_root)
-            if best is not None and near and singular and reached.objective < compute_threshold(state):
+            near = best and singular and has_runaway_root(best.checked.structure.roots, tuning.far_root)
+            if best and near and reached.objective < compute_threshold(state):
                 advice = write_mass_advice(state.problem)
                 words = f"a better design may be close to a singular mass matrix (a0 = 0); {advice}"
                 state = replace(state, fallback=Fallback(best.parameters, words))
@@ -269,17 +273,9 @@ def has_merged_roots(trial: CheckedEnd) -> bool:
 
 
 RESCUES = (
-    Rescue(
-        "other chains",
-        "",
-        lambda s: (
-            any(end.crossing for end in s.ends)
-            and (s.best is None or bool(s.best.checked.violations))
-            and degrees_of_freedom(s.problem).count > 0
-        ),
-        search_other_chains,
-    ),
-    Rescue("real roots", "hard 3", has_both_root_limits, search_real_roots),
+    Rescue("other chains", "", has_only_crossings, search_other_chains),
+    # If both are variables, their factors are singular where real roots meet.
+    Rescue("real roots", "hard 3", lambda s: {"abscissa", "damping_ratio"} <= {*s.nlp.variables}, search_real_roots),
     Rescue("positive roots", "hard 7, systems 1, variety 4", can_have_positive_roots, search_positive_roots),
     Rescue("appeals", "sixfold 14", lambda s: bool(find_rivals(s)), restart_from_rivals),
     Rescue("aside", "narrow 14, hard 4, variety 1", has_doubtful_claim, move_aside),

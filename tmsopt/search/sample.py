@@ -58,7 +58,7 @@ class DesignBatch:
 
     def take_first(self, most: int) -> "DesignBatch":
         """The first few."""
-        return self.take(np.arange(min(most, len(self))))
+        return self.take(np.arange(len(self))[:most])
 
     def select_apart(self, most: int, distance: float) -> "DesignBatch":
         """The first few that are at least this far apart."""

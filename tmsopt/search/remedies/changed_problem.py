@@ -47,7 +47,8 @@ def solve_again(
     A few starts suffice if they end at a stable design. They also suffice if all end at one least abscissa that is not
     stable, unless `thorough`. Otherwise the whole search runs.
     """
-    stable = _require_stability(problem, original)
+    limits = {**problem.constraints, **stability_limit(original, _LEAST_DECAY)}
+    stable = problem.derive(constraints=limits, minimize=None, maximize=None)
     states = begin_search(problem, options)
     few = [None if problem.cases else _search_few_starts(state, stable, thorough) for state in states]
     outcomes = [outcome or search_nested(state) for state, outcome in zip(states, few, strict=True)]
@@ -57,20 +58,16 @@ def solve_again(
     return best.parameters if _is_met(stable, best) else {}
 
 
-def _require_stability(problem: Posed, original: Posed) -> Posed:
-    """The limits of a problem, and stability if the original problem needs it."""
-    limits = {**problem.constraints, **stability_limit(original, _LEAST_DECAY)}
-    return problem.derive(constraints=limits, minimize=None, maximize=None)
-
-
 def _search_few_starts(state: SearchState, stable: Posed, thorough: bool) -> Outcome | None:
     """The outcome of a few starts if it settles the question: a stable design, or one least abscissa for all starts."""
     state = replace(state, sample=POLICY.sample(state))
     state = run_nested(state, POLICY.starts(state), POLICY, _FEW_STARTS)
     outcome = assess_best(state, Starts())
-    if outcome is None or outcome.status != "optimal":
-        return None
-    if has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway):
+    if (
+        outcome is None
+        or outcome.status != "optimal"
+        or has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway)
+    ):
         return None
     agreed = all(end.feasible for end in state.ends) and count_starts(state.ends, 0.0).optima == 1
     settled = agreed and not thorough and minimizes_abscissa(state.part)

@@ -45,9 +45,10 @@ def add_required_speed(solution: Solution, options: Options) -> tuple[Solution, 
             design = (max if highest else min)(found, key=lambda p: p[name])
             if name in problem.free and math.isclose(design[name], ends[highest], rel_tol=_AT_END):
                 return solution, design
-            short = limit_time(options)
+            short, one = limit_time(options), unit_of(problem, name).one
+            rounded = [round_outwards(design[name] / one, not highest, digits) * one for digits in (DIGITS, 4, 2)]
             with suppress(OutOfTime):
-                for shown in _list_rounded(problem, name, design[name], not highest):
+                for shown in dict.fromkeys(rounded):
                     fixed = _set_range(problem, name, (shown, shown))
                     if solve_again(fixed, short, problem, thorough=True):
                         need = RequiredValue(name, design[name], highest, ends, Table(design), shown)
@@ -64,12 +65,6 @@ def _set_range(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
     """The problem with another range of a parameter; with equal ends, the parameter is fixed."""
     free, fixed = {**problem.free, name: ends}, {n: x for n, x in problem.fixed.items() if n != name}
     return problem.derive(fixed=fixed, free={n: free[n] for n in problem.parameter_set.names if n in free}, start={})
-
-
-def _list_rounded(problem: Posed, name: str, value: float, up: bool) -> Iterator[float]:
-    """The value rounded to fewer and fewer digits, towards where a design exists."""
-    one = unit_of(problem, name).one
-    yield from dict.fromkeys(round_outwards(value / one, up, digits) * one for digits in (DIGITS, 4, 2))
 
 
 def _can_speed_help(solution: Solution) -> bool:
