@@ -98,6 +98,25 @@ def arm(design):
 # Searches
 
 
+def judge(sense, expression, limits, quantities):
+    """A function of designs: what is to be least, and the violation of the limits, as Python itself reads their texts.
+
+    Its quantities are given as functions of designs, by name.
+    """
+    asked = {n: function for n, function in quantities.items() if any(n in text for text in (expression, *limits))}
+
+    def judged(design):
+        at = {**design, **{n: function(design) for n, function in asked.items()}}
+        value = eval(expression, {}, at)
+        violations = [0 * value]
+        for text in limits:
+            less, more = text.split("<=") if "<=" in text else reversed(text.split(">="))
+            violations.append(eval(less, {}, at) - eval(more, {}, at))
+        return -value if sense == "maximize" else value, np.max(np.broadcast_arrays(*violations), axis=0)
+
+    return judged
+
+
 def least(
     merit,
     fixed,

@@ -1,19 +1,17 @@
 """Limits that are flat where they bind: met to 1e-9 they leave 1e-4 of a parameter, and are judged in that."""
 
 import pytest
+from helpers.skates import skate
 
 import tmsopt
 from tmsopt.evaluation import recheck
-from tmsopt.models import tms
 
-FIXED = {"chi_H": 1.0, "zeta_H": -0.2, "zeta_B": -0.4, "mu": 0.1}
 FREE = {"chi_B": (1.01, 5.0), "Fr": (0.01, 10.0), "lambda_s": (0.02, 1.4)}
 DESIGN = {"chi_B": 1.5, "lambda_s": 0.4}
 
 
 def bicycle(*limits, **asked):
-    constraints = {f"limit{k}": text for k, text in enumerate(limits)}
-    return tmsopt.Problem(model=tms, fixed=FIXED, free=FREE, constraints=constraints, **asked)
+    return skate(FREE, constraints={f"limit{k}": text for k, text in enumerate(limits)}, **asked)
 
 
 def violated(limit, **parameters):

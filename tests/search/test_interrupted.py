@@ -1,13 +1,13 @@
-"""Ctrl-C leaves the best design so far: of x, whose one root is x⁴/4 − x²/2 + x/10 − 1, with wells near −1.05 and 0.95."""
+"""Long work tells how far it is, and Ctrl-C leaves the best design so far: here of two wells (helpers/wells.py)."""
 
 import os
 import signal
 from dataclasses import replace
 from importlib import import_module
 
-import casadi as ca
 import numpy as np
 import pytest
+from helpers.wells import LEFT, depth, wells, x
 
 import tmsopt
 from tmsopt.global_search import SCIP
@@ -17,18 +17,11 @@ from tmsopt.studies import Sampling, plan_study
 solving = import_module("tmsopt.search.solve")
 asking = import_module("tmsopt.global_search.stability")
 
-x = ca.SX.sym("x")
-LEAST = min(np.roots([1, 0, -1, 0.1]).real.tolist())  # where the slope is 0, in the deeper well
 MET = 1e-9  # feasibility to which a design is checked
 
 
-def depth(at):
-    return at**4 / 4 - at**2 / 2 + at / 10 - 1
-
-
 def problem(limit="x <= 2", **asked):
-    model = from_coefficients([1, -depth(x)])
-    return tmsopt.Problem(model, free={"x": (-2.0, 2.0)}, minimize="abscissa", constraints={"limit": limit}, **asked)
+    return wells(minimize="abscissa", constraints={"limit": limit}, **asked)
 
 
 def stop(*_):
@@ -63,7 +56,7 @@ def test_the_best_so_far(how):
     assert found.starts.tried == 3
     assert found.parameters["x"] >= -1.5 - MET
     assert found.value == pytest.approx(depth(found.parameters["x"]), abs=1e-12)  # doubles of size 1
-    assert depth(LEAST) - 1e-12 <= found.value <= depth(0.2)  # of its start
+    assert depth(LEFT) - 1e-12 <= found.value <= depth(0.2)  # of its start
     assert found.to_json()["interrupted"] is True
     assert "interrupted" not in tmsopt.solve(asked).to_json()
 
@@ -78,7 +71,7 @@ def test_where_no_start_has_ended_the_best_that_was_looked_at_is_left():
     """Its sample was refined to 4e-4 of the box, where the well has the curvature 3 x² − 1 = 2.3."""
     found = tmsopt.solve(problem(), throw=False, policy=replace(tmsopt.POLICY, local=stop))
     assert (found.status, found.interrupted, found.starts.tried) == ("not_converged", True, 0)
-    assert depth(LEAST) <= found.value <= depth(LEAST) + 2.3 / 2 * (4 * 4e-4) ** 2
+    assert depth(LEFT) <= found.value <= depth(LEFT) + 2.3 / 2 * (4 * 4e-4) ** 2
 
 
 def test_a_part_of_the_box_that_was_done_counts():
@@ -153,3 +146,16 @@ def test_a_second_one_ends_that_too(monkeypatch):
 def test_verbs_that_solve_on_the_way_are_ended_whole(verb):
     with pytest.raises(KeyboardInterrupt):
         verb(tmsopt.load("problems/ep4.toml"))
+
+
+@pytest.mark.parametrize(
+    ("limit", "status", "what", "least"),
+    [("x <= 2", "optimal", "searching", {0, 1}), ("x >= 10", "infeasible", "change of limits", {1})],
+)
+def test_long_work_tells_how_far_it_is(limit, status, what, least):
+    """Starts of a search, and those of a relaxation."""
+    told = []
+    assert tmsopt.solve(problem(limit), throw=False, progress=told.append).status == status
+    passed = [t for t in told if what in t.what]
+    assert least <= {t.done for t in passed}
+    assert all(t.done <= t.most for t in passed if t.done)

@@ -6,16 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers import hunt
+from helpers.skates import FIXED, skate
 
 import tmsopt
 from tmsopt import laws
 from tmsopt.analysis import infeasible_sentences
-from tmsopt.models import tms
 
-FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
-SLOW = tmsopt.Problem(
-    tms, fixed={**FIXED, "Fr": 0.5}, free={"chi_B": (1.01, 3.0), "lambda_s": (0.1, 1.2)}, minimize="abscissa"
-)
+SLOW = skate({"chi_B": (1.01, 3.0), "lambda_s": (0.1, 1.2)}, {"Fr": 0.5}, minimize="abscissa")
 
 
 def grid(*ends, points=801):
@@ -85,12 +82,8 @@ def test_a_speed_in_the_unit_in_which_it_was_typed(tmp_path):
 def test_the_speed_plays_no_part_where_the_loads_conflict_or_a_limit_is_about_it():
     """chi_T <= 1 asks chi_B <= 1 at chi_H = 1; the speed is in no coefficient of that."""
     loads = replace(SLOW, constraints={"load": "load_rear >= 0"})
-    limited = replace(
-        SLOW,
-        fixed=FIXED,
-        free={**SLOW.free, "Fr": (0.1, 5.0)},
-        constraints={"decay": "abscissa <= -0.8", "slow": "Fr <= 1"},
-    )
+    limits, free = {"decay": "abscissa <= -0.8", "slow": "Fr <= 1"}, {**SLOW.free, "Fr": (0.1, 5.0)}
+    limited = replace(SLOW, fixed=FIXED, free=free, constraints=limits)
     for problem in (loads, limited):
         design = tmsopt.solve(problem, throw=False)
         assert design.status == "infeasible"

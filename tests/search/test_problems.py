@@ -14,6 +14,7 @@ import pytest
 from helpers import hunt
 from helpers.hunt import abscissa, arm, centre, damping_ratio
 from helpers.oracles import abscissa_60, polynomial_60
+from helpers.skates import EP4
 
 import tmsopt
 from tmsopt import laws
@@ -110,9 +111,7 @@ def test_answer_is_attained_and_a_global_search_ends_there(name):
     merit, tolerance = QUESTIONS[name]
     design, (_, best) = solved(name), hunted(name)
     assert design.status == "optimal"
-    _, box = hunt.read(name)
-    for parameter, (low, high) in box.items():
-        assert low <= design.parameters[parameter] <= high
+    assert all(low <= design.parameters[n] <= high for n, (low, high) in hunt.read(name)[1].items())
     value, violation = merit(dict(design.parameters))
     assert violation <= FEASIBLE
     # Parameters rounded to doubles shift a 4-fold root by 4e-4, and a double one, as in the worst corner of a tolerance, by
@@ -127,8 +126,8 @@ def test_answer_is_attained_and_a_global_search_ends_there(name):
 
 def test_negative_tilt_is_the_dual_of_the_ep4_of_the_paper():
     """Duality: heights exchanged, chi_B → 1/chi_B, Fr → Fr/chi_B, tan λ → −tan λ/chi_B². It needs no ballast."""
-    design, law = solved("negative_tilt"), laws.ep4_chi_H_1(-0.4, -0.2)
-    dual = laws.dual(law.Fr, law.chi_B, -0.4, -0.2, law.lambda_s)
+    design = solved("negative_tilt")
+    dual = laws.dual(EP4.Fr, EP4.chi_B, -0.4, -0.2, EP4.lambda_s)
     for name in ("Fr", "chi_B", "lambda_s"):
         assert design.parameters[name] == pytest.approx(float(dual[name]), abs=1e-12)
     assert design.abscissa == pytest.approx(-(12.5**0.25), abs=1e-12)  # the bound omega0, at chi_H = 1 the same for all
@@ -198,9 +197,7 @@ def robot_violation(d):
     w = fixed["w"]
     si = {"v": d["Fr"] * sqrt(9.81 * w), "m_H": d["mu"] * fixed["m_B"], "lambda_s": d["lambda_s"]}
     si |= {f"x_{k}": d[f"chi_{k}"] * w for k in "BH"} | {f"z_{k}": d[f"zeta_{k}"] * w for k in "BH"}
-    outside = [
-        np.maximum((low - si[n]) / (high - low), (si[n] - high) / (high - low)) for n, (low, high) in box.items()
-    ]
+    outside = [np.maximum(low - si[n], si[n] - high) / (high - low) for n, (low, high) in box.items()]
     _, constraints = point_mass_robot({**fixed, **si})
     bad = sum(np.maximum(violation, 0) for violation in (*outside, constraints))
     return np.where(np.isfinite(bad), bad, 1e2)
@@ -262,27 +259,25 @@ def test_ballast_costs_nearly_all_of_the_decay():
 @pytest.mark.slow
 def test_band_is_held_at_every_speed_and_not_only_at_seven():
     design = solved("speed_band")
-    value, _ = over_band({n: np.asarray(v) for n, v in design.parameters.items()}, FINE_SPEEDS)
+    value, _ = over_band(dict(design.parameters), FINE_SPEEDS)
     assert value == pytest.approx(design.value, abs=1e-8)
     point, _ = hunted("speed_band")
-    searched, _ = over_band({n: np.asarray(v) for n, v in point.items()}, FINE_SPEEDS)
+    searched, _ = over_band(dict(point), FINE_SPEEDS)
     assert value <= searched + 1e-9
-    law = laws.ep4_chi_H_1(-0.4, -0.2)
     slow, fast = (float(abscissa({**design.parameters, "Fr": Fr})) for Fr in (1.2, 2.4))
     between = float(abscissa({**design.parameters, "Fr": FINE_SPEEDS[400:2000]}).max())
     # Two free parameters, so three speeds decide: both ends and one between, as in Chebyshev's problem.
     assert [slow, fast, between] == pytest.approx([design.value] * 3, abs=1e-6)
-    of_ep4, _ = over_band({**point, "chi_B": np.asarray(law.chi_B), "lambda_s": np.asarray(law.lambda_s)}, FINE_SPEEDS)
+    of_ep4, _ = over_band({**point, "chi_B": EP4.chi_B, "lambda_s": EP4.lambda_s}, FINE_SPEEDS)
     assert of_ep4 > 0  # the bicycle of the EP4 weaves at the slow end
 
 
 def test_workshop_is_held_in_the_whole_box_of_errors():
     design = solved("workshop")
-    value, _ = in_workshop({n: np.asarray(v) for n, v in design.parameters.items()}, FINE_STEPS)
+    value, _ = in_workshop(dict(design.parameters), FINE_STEPS)
     # Three corners tie, and at one of them two roots are equal: eigenvalues there are right to half the digits.
     assert value == pytest.approx(design.value, abs=1e-6)
-    law = laws.ep4_chi_H_1(-0.4, -0.2)
-    ep4 = {"x_B": np.asarray(law.chi_B), "lambda_s": np.asarray(law.lambda_s), "v": law.Fr * sqrt(9.81)}
+    ep4 = {"x_B": EP4.chi_B, "lambda_s": EP4.lambda_s, "v": EP4.Fr * sqrt(9.81)}
     of_ep4, _ = in_workshop({**hunt.read("workshop")[0], **ep4})
     assert of_ep4 > value + 0.4  # -1.09 against -1.52
 
@@ -305,8 +300,7 @@ def test_least_ballast_of_an_isospectral_family():
     assert design.value == pytest.approx(best, abs=1e-8)
     law = laws.ep4(-1.0, *(design.parameters[n] for n in ("zeta_B", "zeta_H", "chi_H")))[0]
     for name, value in {**law._asdict(), "lambda_s": law.lambda_s}.items():
-        if name in design.parameters:
-            assert design.parameters[name] == pytest.approx(float(value), rel=1e-7)
+        assert design.parameters.get(name, value) == pytest.approx(float(value), rel=1e-7)
     assert arm(dict(design.parameters)) >= 0.05 - 1e-9
     assert 1 < point["chi_H"] < 1.1  # the front mass just ahead of the front contact, as the file says
     assert design.parameters["lambda_s"] > pi / 180

@@ -31,10 +31,14 @@ MET = 1e-9  # of a design: regular in the factored form, so IPOPT's 1e-12 times 
 # The models, by exact algebra
 
 
+def written(name):
+    return tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))
+
+
 @cache
 def polynomial(name):
     """Characteristic polynomial of a file's model, its coefficients exact in the parameters."""
-    model = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))["model"]
+    model = written(name)["model"]
 
     def exact(text):
         return sp.sympify(text, locals={n: sp.Symbol(n) for n in ("gain", "k", "y", "p")}, rational=True)
@@ -55,8 +59,7 @@ def polynomial(name):
 
 def at(name, values):
     """The same with numbers for the parameters, fixed ones from the file."""
-    written = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))["parameters"]
-    fixed = {n: sp.Rational(str(v)) for n, v in written.items() if not isinstance(v, dict)}
+    fixed = {n: sp.Rational(str(v)) for n, v in written(name)["parameters"].items() if not isinstance(v, dict)}
     return sp.Poly(polynomial(name).as_expr().subs({**fixed, **values}), s)
 
 
@@ -239,12 +242,10 @@ def solved(name):
 def ends_at(design, answer):
     """The design has the parameters, abscissa, structure and value of a closed form."""
     assert design.status == "optimal"
-    for parameter, value in answer.parameters.items():
-        assert design.parameters[str(parameter)] == pytest.approx(float(value), abs=MET), parameter
-    assert design.abscissa == pytest.approx(float(answer.abscissa), abs=MET)
+    met = [(design.parameters[str(name)], value) for name, value in answer.parameters.items()]
+    for found, value in (*met, (design.abscissa, answer.abscissa), (design.value, answer.value)):
+        assert value is None or found == pytest.approx(float(value), abs=MET)
     assert design.structure == answer.structure
-    if answer.value is not None:
-        assert design.value == pytest.approx(float(answer.value), abs=MET)
 
 
 @pytest.mark.parametrize("name", [name for name in ANSWERS if name != "three_masses"])  # all of its EP3 are below
@@ -285,9 +286,8 @@ def test_best_damping_need_not_be_positive():
 
 def test_poles_far_smaller_than_the_rates_of_the_system_meet_too():
     """Poles at −0.05 of a system of rate 1: the last coefficient, 3e-7, is a difference of numbers near 1."""
-    problem = tmsopt.load(PROBLEMS / "chocolate_limit.toml")
-    slow = replace(problem, constraints={**problem.constraints, "decay": "abscissa <= -0.05"})
-    design = tmsopt.solve(slow)
+    limited = problem("chocolate_limit")
+    design = tmsopt.solve(replace(limited, constraints={**limited.constraints, "decay": "abscissa <= -0.05"}))
     t = sp.acos(sp.Float(design.parameters["delta"], 30))
     f = (t + sp.pi / 2) / 5
     assert design.structure == "EP5"

@@ -9,21 +9,17 @@ import numpy as np
 import pytest
 from helpers import hunt
 from helpers.hunt import abscissa
+from helpers.skates import BOX, EP4, FIXED, skate
 
 import tmsopt
-from tmsopt import laws
 from tmsopt.analysis import infeasible_sentences
+from tmsopt.models import from_coefficients
 from tmsopt.problem import move_limits, replace_limits
 from tmsopt.records import Table
 
-TMS = tmsopt.models.tms
-FIXED = {"chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2}
-BOX = {"Fr": (0.5, 4.0), "chi_B": (1.05, 3.0), "lambda_s": (0.05, 1.2)}
-EP4 = laws.ep4_chi_H_1(-0.4, -0.2)
-
 
 def problem(free=None, **asked):
-    return tmsopt.Problem(TMS, fixed=FIXED, free={**BOX, **(free or {})}, **{"minimize": "Fr", **asked})
+    return skate({**BOX, **(free or {})}, **{"minimize": "Fr", **asked})
 
 
 @cache
@@ -46,7 +42,7 @@ PROBLEMS = {
 
 
 AMOUNTS = {
-    "two bounds": {"low": 0.3},  # or high; equal limits give way one at a time
+    "two bounds": {"low": 0.3},  # or high
     "faster than omega0": {"decay": 2 - 0.08**-0.25},  # omega0 = −(ζ_B ζ_H)^(−1/4), the product of the roots
     "ep4 above the law": {"chi_B.min": 1.6 - sqrt(2)},
     "ep4 too slow": {"Fr.max": float(EP4.Fr) - 2.0},
@@ -61,11 +57,8 @@ def test_amounts_in_closed_form(key):
     design = failed(key)
     assert design.status == "infeasible"
     found = dict(design.relaxation.amounts)
-    if key == "two bounds":
-        assert sum(found.values()) == pytest.approx(0.3, abs=1e-9)
-        assert len(found) == 1
-    else:
-        assert found == pytest.approx(AMOUNTS[key], abs=1e-9)
+    expected = AMOUNTS[key] if "high" not in found else {"high": 0.3}  # equal limits give way one at a time
+    assert found == pytest.approx(expected, abs=1e-9)
     assert set(found) <= set(design.relaxation.conflict)
     assert json.loads(json.dumps(design.to_json()))["relaxation"]["amounts"] == found
 
@@ -78,20 +71,28 @@ def test_the_relaxed_design_is_the_ep4_where_nothing_decays_faster():
 
 @pytest.mark.slow
 def test_conflicts_name_the_limits_that_hold_and_no_others():
-    assert set(failed("two bounds").relaxation.conflict) == {"high", "low"}
-    assert failed("faster than omega0").relaxation.conflict == ("decay",)  # no bound is near
-    assert failed("ep4 above the law").relaxation.conflict == ("chi_B.min",)
-    assert set(failed("equal, below").relaxation.conflict) == {"place", "chi_B.min"}
-    assert set(failed("equal, above").relaxation.conflict) == {"place", "chi_B.max"}
-    # At a lower tilt less would do, 0.5690 in place of 0.5695, but not nothing.
-    assert set(failed("slow and stable").relaxation.conflict) == {"decay", "slow"}
+    assert {key: set(failed(key).relaxation.conflict) for key in PROBLEMS} == {
+        "two bounds": {"high", "low"},
+        "faster than omega0": {"decay"},  # no bound is near
+        "ep4 above the law": {"chi_B.min"},
+        "ep4 too slow": {"Fr.max"},
+        "equal, below": {"place", "chi_B.min"},
+        "equal, above": {"place", "chi_B.max"},
+        "slow and stable": {"decay", "slow"},  # at a lower tilt less would do, 0.5690 for 0.5695, but not nothing
+    }
 
 
-def test_limits_alone():
-    assert failed("two bounds").relaxation.alone == pytest.approx({"high": 0.3, "low": 0.3}, abs=1e-9)
-    assert failed("equal, above").relaxation.alone == pytest.approx({"place": -1.0, "chi_B.max": 0.5}, abs=1e-9)
-    assert failed("equal, below").relaxation.alone == pytest.approx({"place": 0.05, "chi_B.min": 0.05}, abs=1e-9)
-    assert failed("faster than omega0").relaxation.alone == {}  # there is one limit only
+@pytest.mark.parametrize(
+    ("key", "alone"),
+    [
+        ("two bounds", {"high": 0.3, "low": 0.3}),
+        ("equal, above", {"place": -1.0, "chi_B.max": 0.5}),
+        ("equal, below", {"place": 0.05, "chi_B.min": 0.05}),
+        ("faster than omega0", {}),  # there is one limit only
+    ],
+)
+def test_limits_alone(key, alone):
+    assert failed(key).relaxation.alone == pytest.approx(alone, abs=1e-9)
 
 
 # Limits that take no part are not named
@@ -263,8 +264,10 @@ def test_moving_by_the_amounts_frees_the_problem_and_by_less_does_not(key):
 def test_the_amount_of_one_limit_is_the_least_by_a_search():
     """The slowest design with abscissa <= −1, and the most stable one with Fr <= 1.2: what each limit needs alone."""
     relaxation = failed("slow and stable").relaxation
-    slowest = min(hunt.least(lambda d: (d["Fr"], abscissa(d) + 1), FIXED, BOX, k, 60, 6)[1] for k in (1, 31))
-    fastest = min(hunt.least(lambda d: (abscissa(d), d["Fr"] - 1.2), FIXED, BOX, k, 60, 6)[1] for k in (1, 31))
+    slowest, fastest = (
+        min(hunt.least(merit, FIXED, BOX, seed, 60, 6)[1] for seed in (1, 31))
+        for merit in (lambda d: (d["Fr"], abscissa(d) + 1), lambda d: (abscissa(d), d["Fr"] - 1.2))
+    )
     assert relaxation.alone == pytest.approx({"slow": slowest - 1.2, "decay": fastest + 1}, abs=1e-6)
     # And together: the sum of the amounts, each relative to the limit, is no more than of one alone.
     assert sum(relaxation.amounts.values()) <= 1.5 * max(slowest - 1.2, fastest + 1)
@@ -311,22 +314,15 @@ def test_a_limit_that_no_design_can_meet_moves_alone():
     """A damping ratio is 1 at most, and that where all roots are real, so that 0.009 is the least; more may be found."""
     box = {"mu": (0.034, 3.3), "chi_B": (0.904, 1.33), "zeta_B": (-1.08, -0.25), "zeta_H": (-0.407, -0.222)}
     plane = "(zeta_B + 0.67)/0.42 + (lambda_s - 0.64)/0.61 <= 0.385"
-    asked = tmsopt.Problem(
-        TMS,
-        fixed={"Fr": 2.77, "chi_H": 0.795},
-        free={**box, "lambda_s": (0.03, 1.25)},
-        maximize="damping_ratio",
-        constraints={"damped": "damping_ratio >= 1.009", "plane": plane},
-    )
-    design = tmsopt.solve(asked, throw=False, stability=0.0)
-    assert set(design.relaxation.amounts) == {"damped"}
-    assert design.relaxation.amounts["damped"] >= 0.009 - 1e-9
-    relaxed = replace(asked, fixed=design.relaxation.parameters, free={})
-    roots = np.roots([float(a) for a in relaxed.posed.values(relaxed.fixed).coefficients])
-    at = relaxed.fixed
+    limits = {"damped": "damping_ratio >= 1.009", "plane": plane}
+    free, fixed = {**box, "lambda_s": (0.03, 1.25)}, {"Fr": 2.77, "chi_H": 0.795}
+    asked = skate(free, fixed, maximize="damping_ratio", constraints=limits)
+    relaxation = tmsopt.solve(asked, throw=False, stability=0.0).relaxation
+    assert set(relaxation.amounts) == {"damped"}
+    assert relaxation.amounts["damped"] >= 0.009 - 1e-9
+    at = relaxation.parameters
     assert (at["zeta_B"] + 0.67) / 0.42 + (at["lambda_s"] - 0.64) / 0.61 <= 0.385 + 1e-9
-    ratio = np.min(-roots.real / np.abs(roots))
-    assert ratio >= 1.009 - design.relaxation.amounts["damped"] - 1e-6
+    assert hunt.damping_ratio(dict(at)) >= 1.009 - relaxation.amounts["damped"] - 1e-6
 
 
 def test_the_headline_names_what_is_out_of_reach_and_not_what_has_no_value_for_it(tmp_path):
@@ -369,3 +365,76 @@ def test_what_a_search_cannot_tell_of_a_conflict_is_said(irreducible, said):
 def test_a_proof_that_none_is_stable_is_no_proof_that_none_is_feasible(known, said):
     design = replace(failed("faster than omega0"), bound=tmsopt.Bound(), abscissa=1.0, stable_elsewhere=known)
     assert f"{said}infeasibility is not proved; --certify" in " ".join(design.report().split())
+
+
+# Limits as a file would write them
+
+
+DECAYING = tmsopt.Problem(
+    from_coefficients([1, "c", 1]), free={"c": (0.1, 1.5)}, minimize="c", constraints={"decay": "abscissa <= -0.8"}
+)
+"""−c/2 <= −0.8 takes c >= 1.6."""
+
+
+def test_the_smallest_change_is_solved_again_as_it_is_written():
+    found = tmsopt.solve(DECAYING, throw=False).relaxation
+    assert dict(found.remedies[0]) == {"decay": "abscissa <= -0.75"}
+    assert [dict(written) for written in found.remedies[1:]] == [{"c.max": "1.6"}]
+    for constraints, free in (({"decay": "abscissa <= -0.75"}, {}), ({}, {"c": (0.1, 1.6)})):
+        changed = replace(DECAYING, constraints=constraints or DECAYING.constraints, free=free or DECAYING.free)
+        assert tmsopt.solve(changed).stable
+
+
+def test_an_end_moves_where_no_limit_makes_a_design_stable():
+    """s² + c s + 1 is stable for c > 0 alone: the greatest abscissa allowed is no remedy."""
+    asked = replace(DECAYING, free={"c": (-3.0, -1.0)}, constraints={"decay": "abscissa <= -0.1"})
+    design = tmsopt.solve(asked, throw=False)
+    assert design.relaxation.remedies
+    for written in design.relaxation.remedies:
+        assert float(written["c.max"]) > 0
+    assert "abscissa <= 0." not in " ".join(infeasible_sentences(design))
+
+
+@pytest.mark.parametrize(
+    ("text", "amount", "digits", "written"),
+    [
+        ("c >= 0.02", 0.00123456, 5, "c >= 0.018765"),
+        ("0.02 <= c", 0.00123456, 3, "0.0187 <= c"),
+        ("c**2 <= 2", 0.000123, 3, "c**2 <= 2.01"),
+        ("2 >= c**2", 0.5, 2, "2.5 >= c**2"),
+        ("c == 1", -0.25, 5, "c == 0.75"),
+        ("1 == c", -0.25, 5, "1.25 == c"),
+        ("c**2 <= c", 0.5, 5, "c**2 <= c + 0.5"),
+        ("c >= c**2", 0.123456789, 3, "c >= c**2 - 0.124"),
+    ],
+)
+def test_a_limit_is_written_so_that_it_suffices(text, amount, digits, written):
+    """Moved to where it forbids less; of an equality the signed amount is added to the right-hand side."""
+    asked = replace(DECAYING, constraints={"limit": text})
+    assert move_limits(asked, {"limit": amount}, digits) == {"limit": written}
+
+
+def test_limits_that_exclude_each_other_are_proved_to():
+    """14 + 1.5 > 15."""
+    masses = {"a": (14.0, 20.0), "b": (1.5, 3.0)}
+    asked = tmsopt.Problem(
+        from_coefficients([1, "a", "b"]), free=masses, minimize="abscissa", constraints={"total": "a + b <= 15"}
+    )
+    design = tmsopt.solve(asked, throw=False)
+    assert (design.status, design.bound.proven, design.bound.method) == ("infeasible", True, "interval")
+    assert not tmsopt.solve(replace(asked, constraints={"total": "a + b <= 15.5"}), throw=False).violations
+
+
+@pytest.mark.parametrize(
+    ("sense", "name", "other"),
+    [
+        ("minimize", "damping_ratio", "maximize"),
+        ("maximize", "abscissa", "minimize"),
+        ("maximize", "-damping_ratio", "minimize"),
+    ],
+)
+def test_an_objective_that_asks_for_the_least_stable_design_is_told_so(sense, name, other):
+    asked = replace(DECAYING, constraints={}, **{"minimize": None, sense: name})
+    assert any(f'{other} = "{name}"' in note for note in tmsopt.solve(asked, throw=False).notes)
+    better = replace(DECAYING, constraints={}, **{"minimize": None, other: name})
+    assert not any("least stable" in note for note in tmsopt.solve(better, throw=False).notes)

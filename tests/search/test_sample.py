@@ -1,11 +1,14 @@
 """The sample of the whole box: what it looks at, how it comes nearer to limits, and basins that starts alone miss."""
 
+import operator
 from importlib import import_module
+from itertools import product
 
 import casadi as ca
 import numpy as np
 import pytest
 from helpers import hunt
+from helpers.skates import skate
 
 import tmsopt
 from tmsopt.models import from_coefficients
@@ -28,15 +31,8 @@ def problem(limits=(), free=None, model=LINEAR, **asked):
 
 def cube():
     """A tangent, decades, two ranges that are not, one of them negative."""
-    fixed = {"chi_H": 1.0, "zeta_H": -0.2}
-    free = {
-        "lambda_s": (-1.2, 1.5),
-        "mu": (0.01, 50.0),
-        "Fr": (0.0, 10.0),
-        "chi_B": (1.0, 99.0),
-        "zeta_B": (-9.0, -0.01),
-    }
-    return Cube(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="abscissa").posed)
+    free = {"lambda_s": (-1.2, 1.5), "mu": (0.01, 50.0), "Fr": (0.0, 10.0), "chi_B": (1.0, 99.0)}
+    return Cube(skate({**free, "zeta_B": (-9.0, -0.01)}, minimize="abscissa").posed)
 
 
 def test_a_design_has_one_point_of_the_cube_and_a_point_one_design():
@@ -60,26 +56,23 @@ def test_ranges_end_exactly_and_are_run_through_in_order():
 
 
 def test_the_designs_of_the_sample_are_counted():
-    design = tmsopt.solve(problem(("1/(x - y) >= 20", "x**2 + y**2 == 0.5")))
-    starts = design.to_json()["starts"]
-    assert set(starts) == {"tried", "converged", "at_best", "expected_unseen"}
-    drawn = draw_box(problem(("1/(x - y) >= 20", "x**2 + y**2 == 0.5")).posed, 0).draws
-    assert design.to_json()["looked"] == design.starts.looked == len(drawn) > 2000
+    asked = problem(("1/(x - y) >= 20", "x**2 + y**2 == 0.5"))
+    design = tmsopt.solve(asked)
+    data = design.to_json()
+    assert set(data["starts"]) == {"tried", "converged", "at_best", "expected_unseen"}
+    assert data["looked"] == design.starts.looked == len(draw_box(asked.posed, 0).draws) > 2000
 
 
 def test_the_sample_fills_the_box_to_its_faces_and_corners():
     """No hole of a tenth of the box, inside or on a face; and all corners."""
-    drawn = draw_box(problem().posed, 0).draws
-    assert drawn.u.min() == 0
-    assert drawn.u.max() == 1
-    assert {(0, 0), (0, 1), (1, 0), (1, 1)} <= {tuple(u) for u in drawn.u.tolist()}
-    inside = drawn.u[np.all((drawn.u > 0) & (drawn.u < 1), axis=1)]
+    u = draw_box(problem().posed, 0).draws.u
+    assert (u.min(), u.max()) == (0, 1)
+    assert {(0, 0), (0, 1), (1, 0), (1, 1)} <= set(map(tuple, u.tolist()))
+    inside = u[np.all((u > 0) & (u < 1), axis=1)]
     counts, _, _ = np.histogram2d(*inside.T, bins=20, range=[(0, 1), (0, 1)])
     assert counts.min() > 0
-    for k in (0, 1):
-        for end in (0.0, 1.0):
-            face = np.sort(drawn.u[drawn.u[:, k] == end][:, 1 - k])
-            assert np.diff(face).max() < 0.1
+    for k, end in product((0, 1), (0.0, 1.0)):
+        assert np.diff(np.sort(u[u[:, k] == end][:, 1 - k])).max() < 0.1
 
 
 def test_the_sample_stands_for_its_seed():
@@ -143,10 +136,9 @@ def test_what_is_refined_is_no_worse_limits_first():
     start = box.draws.take(np.arange(0, 4000, 40))
     ends = box.refine(start)
     assert len(ends) == len(start)
-    before, after = zip(start.violation, start.objective, strict=True), zip(ends.violation, ends.objective, strict=True)
-    pairs = list(zip(before, after, strict=True))
-    assert all(new <= old for old, new in pairs)
-    assert sum(new < old for old, new in pairs) > 0.9 * len(pairs)
+    old, new = (list(zip(seen.violation, seen.objective, strict=True)) for seen in (start, ends))
+    assert all(map(operator.le, new, old))
+    assert sum(map(operator.lt, new, old)) > 0.9 * len(old)
     assert np.all((ends.u >= 0) & (ends.u <= 1))
     again = box.judge_points(ends.u)
     assert np.array_equal(again.objective, ends.objective)

@@ -3,12 +3,13 @@
 import math
 import pickle
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import FrozenInstanceError, fields, replace
+from dataclasses import FrozenInstanceError, fields
 from functools import cache
 
 import numpy as np
 import pytest
 from helpers.oracles import abscissa_60, polynomial_60
+from helpers.skates import skate
 
 import tmsopt
 from tmsopt import laws
@@ -17,14 +18,11 @@ from tmsopt.problem import degrees_of_freedom
 from tmsopt.program import Options, SolveOptions
 from tmsopt.roots import PATTERNS, pattern_distance, roots
 
-TMS = tmsopt.models.tms
-HEIGHTS = {"zeta_B": -0.4, "zeta_H": -0.2}
 BOX = {"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (0.02, 1.4)}
 
 
 def ep4_problem(**changes):
-    given = {"fixed": {"chi_H": 1.0, "mu": 0.1, **HEIGHTS}, "free": BOX, "minimize": "abscissa"}
-    return tmsopt.Problem(TMS, **{**given, **changes})
+    return skate(**{"free": BOX, "minimize": "abscissa", **changes})
 
 
 @cache
@@ -45,9 +43,9 @@ EP4 = {
 }
 
 
-@pytest.mark.parametrize("objective", [{"minimize": "abscissa"}, {"minimize": None, "locate": "EP4"}])
-def test_both_formulations_reach_the_closed_form_ep4(objective):
-    design = tmsopt.solve(ep4_problem(**objective)) if objective["minimize"] is None else best()
+@pytest.mark.parametrize("located", [False, True])
+def test_both_formulations_reach_the_closed_form_ep4(located):
+    design = tmsopt.solve(skate(BOX, locate="EP4")) if located else best()
     for name, value in EP4.items():
         assert design.parameters[name] == pytest.approx(value, abs=1e-12)
     assert design.structure == "EP4"
@@ -66,13 +64,8 @@ def test_ep4_is_proven_globally_optimal():
 
 
 def test_optimised_benchmark_of_the_paper():
-    problem = tmsopt.Problem(
-        TMS,
-        fixed={"chi_H": 1.02, **HEIGHTS},
-        free={**BOX, "mu": (0.001, 100), "chi_B": (1, 3), "lambda_s": (0.02, 1.5)},
-        constraints={"decay": "omega0 == -1"},
-        locate="EP4",
-    )
+    free = {**BOX, "mu": (0.001, 100), "chi_B": (1, 3), "lambda_s": (0.02, 1.5)}
+    problem = skate(free, {"chi_H": 1.02}, constraints={"decay": "omega0 == -1"}, locate="EP4")
     assert degrees_of_freedom(problem.posed).kind == "square"
     design = tmsopt.solve(problem)
     first, second = laws.ep4(-1.0, -0.4, -0.2, 1.02)  # closed form for any chi_H
@@ -80,11 +73,10 @@ def test_optimised_benchmark_of_the_paper():
     for name, value in expected.items():
         assert design.parameters[name] == pytest.approx(value, abs=1e-10)
     assert design.parameters["mu"] == pytest.approx(float(first.mu), rel=1e-12)
-    other = [b for b in design.branches if b.parameters["mu"] < 0 < b.parameters["Fr"]]
-    assert len(other) == 1
-    assert "mu.min" in other[0].excluded_by
-    assert other[0].parameters["mu"] == pytest.approx(float(second.mu), rel=1e-9)
-    assert other[0].parameters["Fr"] == pytest.approx(float(second.Fr), rel=1e-9)
+    (other,) = (b for b in design.branches if b.parameters["mu"] < 0 < b.parameters["Fr"])
+    assert "mu.min" in other.excluded_by
+    for name in ("mu", "Fr"):
+        assert other.parameters[name] == pytest.approx(float(getattr(second, name)), rel=1e-9)
 
 
 @pytest.mark.parametrize(("zeta_B", "zeta_H"), [(-0.9, -0.3), (-0.5, -0.45), (-1.4, -0.1), (-0.3, -0.6)])
@@ -93,12 +85,8 @@ def test_ep4_for_other_heights_and_both_tilts(zeta_B, zeta_H):
     law = laws.ep4_chi_H_1(zeta_B, zeta_H)
     sign = math.copysign(1, float(law.tan_lambda_s))
     tilt = tuple(sorted((sign * 0.001, sign * 1.5)))
-    design = tmsopt.solve(
-        ep4_problem(
-            fixed={"chi_H": 1.0, "mu": 3.0, "zeta_B": zeta_B, "zeta_H": zeta_H},
-            free={"Fr": (0.01, 20), "chi_B": (0.1, 8), "lambda_s": tilt},
-        )
-    )
+    free = {"Fr": (0.01, 20), "chi_B": (0.1, 8), "lambda_s": tilt}
+    design = tmsopt.solve(ep4_problem(fixed={"mu": 3.0, "zeta_B": zeta_B, "zeta_H": zeta_H}, free=free))
     assert design.structure == "EP4"
     assert design.parameters["chi_B"] == pytest.approx(float(law.chi_B), abs=1e-11)
     assert math.tan(design.parameters["lambda_s"]) == pytest.approx(float(law.tan_lambda_s), abs=1e-11)
@@ -110,9 +98,7 @@ def test_ep4_for_other_heights_and_both_tilts(zeta_B, zeta_H):
 def test_every_pattern_is_located(pattern):
     """The 60-digit coefficients of the design are those of the pattern, to what double parameters can hold."""
     free = {**BOX, "zeta_B": (-1.2, -0.05), "chi_B": (0.1, 5), "chi_H": (0.7, 1.3)}  # both tilts: test_sides.py
-    fixed = {"mu": 2.0, "zeta_H": -0.2}
-    problem = tmsopt.Problem(TMS, fixed=fixed, free=free, locate=pattern, constraints={"offset": "nu_H >= 0.02"})
-    design = tmsopt.solve(problem)
+    design = tmsopt.solve(skate(free, {"mu": 2.0}, locate=pattern, constraints={"offset": "nu_H >= 0.02"}))
     exact = [float(c) for c in polynomial_60(**design.parameters)]
     assert pattern_distance(PATTERNS[pattern], exact) < 1e-13
     assert design.freedom.count == 5 - PATTERNS[pattern].codimension
@@ -125,21 +111,15 @@ def test_a_pattern_that_no_bicycle_has_is_infeasible():
     k = chi_H - 1, a2/a0 > 0 and a4/a0 > 0 ask for T > 10 k and k > 0.4 T and k > -0.2 T (or all reversed): never.
     """
     free = {**BOX, "lambda_s": (-1.3, 1.4), "zeta_B": (-1.2, -0.05), "chi_B": (0.1, 5), "chi_H": (0.7, 1.3)}
-    problem = tmsopt.Problem(TMS, fixed={"mu": 2.0, "zeta_H": -0.2}, free=free, locate="resonance")
-    design = tmsopt.solve(problem, throw=False)
+    design = tmsopt.solve(skate(free, {"mu": 2.0}, locate="resonance"), throw=False)
     assert design.status == "infeasible"
     assert "resonance" in design.violations
 
 
 def test_pattern_with_an_objective_over_its_set():
     """Least ω0 over the EP4 designs with chi_H = 1: ω0 = −(ζ_B ζ_H)^(−1/4), so both heights end at their least."""
-    problem = ep4_problem(
-        fixed={"chi_H": 1.0, "mu": 1.0},
-        free={**BOX, "lambda_s": (0.02, 1.5), "zeta_B": (-0.8, -0.3), "zeta_H": (-0.25, -0.1)},
-        minimize="omega0",
-        locate="EP4",
-    )
-    design = tmsopt.solve(problem)
+    free = {**BOX, "lambda_s": (0.02, 1.5), "zeta_B": (-0.8, -0.3), "zeta_H": (-0.25, -0.1)}
+    design = tmsopt.solve(skate(free, {"mu": 1.0}, minimize="omega0", locate="EP4"))
     assert design.freedom.kind == "under-determined"
     assert design.freedom.count == 2
     assert design.value == pytest.approx(-((0.3 * 0.1) ** -0.25), rel=1e-10)
@@ -150,8 +130,8 @@ def test_pattern_with_an_objective_over_its_set():
 
 @pytest.mark.slow
 def test_locate_alone_with_freedom_takes_the_design_nearest_the_start():
-    problem = ep4_problem(minimize=None, locate="2EP2", start={"Fr": 2.3, "chi_B": 1.45, "lambda_s": 0.3})
-    design = tmsopt.solve(problem, starts=16)
+    start = {"Fr": 2.3, "chi_B": 1.45, "lambda_s": 0.3}
+    design = tmsopt.solve(skate(BOX, locate="2EP2", start=start), starts=16)
     assert design.structure == "2EP2"
     assert design.freedom.count == 1
     # On the set chi_B = √2 and Fr = epset(λ_s): the nearest point by a fine independent scan along the curve.
@@ -163,28 +143,17 @@ def test_locate_alone_with_freedom_takes_the_design_nearest_the_start():
     assert design.parameters["Fr"] == pytest.approx(laws.epset(-0.4, -0.2, design.parameters["lambda_s"]), abs=1e-11)
 
 
-def test_over_determined_and_inconsistent_pattern_is_infeasible():
-    problem = ep4_problem(
-        fixed={"chi_H": 1.0, "mu": 0.1, "chi_B": 1.3, **HEIGHTS},
-        free={"Fr": (0.01, 10), "lambda_s": (0.02, 1.4)},
-        minimize=None,
-        locate="EP4",
-    )
+@pytest.mark.parametrize(("chi_B", "status"), [(1.3, "infeasible"), (math.sqrt(2), "optimal")])
+def test_an_over_determined_pattern_is_found_if_it_is_consistent(chi_B, status):
+    free = {n: BOX[n] for n in ("Fr", "lambda_s")}
+    problem = skate(free, {"chi_B": chi_B}, locate="EP4")
     assert degrees_of_freedom(problem.posed).kind == "over-determined"
     design = tmsopt.solve(problem, throw=False)
-    assert design.status == "infeasible"
-    assert "EP4" in design.violations
-
-
-def test_over_determined_but_consistent_pattern_is_found():
-    problem = ep4_problem(
-        fixed={"chi_H": 1.0, "mu": 0.1, "chi_B": math.sqrt(2), **HEIGHTS},
-        free={"Fr": (0.01, 10), "lambda_s": (0.02, 1.4)},
-        minimize=None,
-        locate="EP4",
-    )
-    design = tmsopt.solve(problem)
-    assert design.parameters["Fr"] == pytest.approx(EP4["Fr"], abs=1e-7)  # least squares: half the digits
+    assert design.status == status
+    if status == "infeasible":
+        assert "EP4" in design.violations
+    else:
+        assert design.parameters["Fr"] == pytest.approx(EP4["Fr"], abs=1e-7)  # least squares: half the digits
 
 
 def test_realised_abscissa_is_that_of_the_stored_parameters():
@@ -196,46 +165,30 @@ def test_realised_abscissa_is_that_of_the_stored_parameters():
 
 
 def test_multipliers_are_gains_found_by_solving_again():
-    problem = tmsopt.Problem(
-        TMS,
-        fixed={"chi_H": 1.0, "mu": 1.0, **HEIGHTS},
-        free={"Fr": (0.01, 1.5), "chi_B": (1.01, 5), "lambda_s": (0.02, 1.4)},
-        constraints={"tilt": "lambda_s <= 0.2", "layout": "chi_B >= 1.35"},
-        minimize="abscissa",
-    )
-    design = tmsopt.solve(problem)
-    step = 1e-5
-    for name, relaxed in (
-        ("Fr.max", replace(problem, free={**problem.free, "Fr": (0.01, 1.5 + step)})),
-        ("tilt", replace(problem, constraints={**problem.constraints, "tilt": f"lambda_s <= {0.2 + step}"})),
-    ):
-        gain = (design.value - tmsopt.solve(relaxed).value) / step
+
+    def solved(fastest=1.5, tilt=0.2):
+        limits = {"tilt": f"lambda_s <= {tilt}", "layout": "chi_B >= 1.35"}
+        free = {**BOX, "Fr": (0.01, fastest)}
+        return tmsopt.solve(ep4_problem(fixed={"mu": 1.0}, free=free, constraints=limits))
+
+    design, step = solved(), 1e-5
+    for name, relaxed in (("Fr.max", solved(fastest=1.5 + step)), ("tilt", solved(tilt=0.2 + step))):
+        gain = (design.value - relaxed.value) / step
         assert design.active.get(name, 0.0) == pytest.approx(gain, rel=1e-3, abs=1e-5)
     assert design.active
 
 
 def test_equality_constraint_multiplier_is_the_slope():
     # EP4 at given heights: γ = −(ζ_B ζ_H)^(−1/4), so dγ/dζ_B = γ / (−4 ζ_B).
-    design = tmsopt.solve(
-        ep4_problem(
-            fixed={"chi_H": 1.0, "mu": 1.0, "zeta_H": -0.2},
-            free={**BOX, "zeta_B": (-0.9, -0.3)},
-            constraints={"height": "zeta_B == -0.4"},
-        )
-    )
+    free = {**BOX, "zeta_B": (-0.9, -0.3)}
+    design = tmsopt.solve(ep4_problem(fixed={"mu": 1.0}, free=free, constraints={"height": "zeta_B == -0.4"}))
     assert design.structure == "EP4"
     assert design.active["height"] == pytest.approx(design.value / (-4 * -0.4), rel=1e-6)
 
 
 def test_maximize_and_general_expressions():
-    problem = tmsopt.Problem(
-        TMS,
-        fixed={"chi_H": 1.0, "mu": 1.0, **HEIGHTS},
-        free=BOX,
-        constraints={"stable": "abscissa <= -0.5", "speed": "Fr <= 2"},
-        maximize="lambda_s - 0.1*chi_B",
-    )
-    design = tmsopt.solve(problem)
+    limits = {"stable": "abscissa <= -0.5", "speed": "Fr <= 2"}
+    design = tmsopt.solve(skate(BOX, {"mu": 1.0}, constraints=limits, maximize="lambda_s - 0.1*chi_B"))
     p = design.parameters
     assert design.value == pytest.approx(p["lambda_s"] - 0.1 * p["chi_B"], abs=1e-12)
     assert float(abscissa_60(polynomial_60(**p))) <= -0.5 + 1e-6
@@ -249,42 +202,30 @@ def test_maximize_and_general_expressions():
 
 def test_damping_ratio_is_maximised_through_factors():
     """Heavy damping (ratio 1) exists at this speed for some tilt, by the paper's middle row of Fig. root loci."""
-    problem = ep4_problem(
-        fixed={"chi_H": 1.0, "mu": 1.0, "Fr": 2.2, **HEIGHTS},
-        free={"chi_B": (1.01, 3), "lambda_s": (0.02, 1.4)},
-        minimize=None,
-        maximize="damping_ratio",
-    )
-    design = tmsopt.solve(problem)
+    free = {"chi_B": (1.01, 3), "lambda_s": (0.02, 1.4)}
+    design = tmsopt.solve(skate(free, {"mu": 1.0, "Fr": 2.2}, maximize="damping_ratio"))
     assert design.value == pytest.approx(1.0, abs=1e-9)
     assert design.quantities["damping_ratio"] == pytest.approx(1.0, abs=1e-9)
 
 
 @pytest.mark.slow
 def test_infeasible_problem_names_the_violation():
-    problem = ep4_problem(constraints={"low": "chi_B <= 1.2", "high": "chi_B >= 1.5"})
     with pytest.raises(tmsopt.NotSolved, match="infeasible") as caught:
-        tmsopt.solve(problem)
+        tmsopt.solve(ep4_problem(constraints={"low": "chi_B <= 1.2", "high": "chi_B >= 1.5"}))
     best = caught.value.solution
     assert best.status == "infeasible"
     assert set(best.violations) <= {"low", "high"}
-    assert sum(best.violations.values()) == pytest.approx(
-        0.3, rel=0.5
-    )  # least total violation, sides of size 1.2 to 1.5
-    assert set(best.parameters) == set(TMS.sets[0].names)
+    # The least total violation, sides of size 1.2 to 1.5.
+    assert sum(best.violations.values()) == pytest.approx(0.3, rel=0.5)
+    assert set(best.parameters) == set(tmsopt.models.tms.sets[0].names)
     assert pickle.loads(pickle.dumps(caught.value)).solution.status == "infeasible"
 
 
 @pytest.mark.parametrize("linear_solver", ["mumps", "spral"])
 def test_silence(capfd, linear_solver):
-    tmsopt.solve(
-        ep4_problem(constraints={"odd": "sqrt(chi_B - 1.2) >= 0.1", "log": "log(Fr - 1) >= -2"}),
-        linear_solver=linear_solver,
-        throw=False,
-    )
-    captured = capfd.readouterr()
-    assert captured.out == ""
-    assert captured.err == ""
+    asked = ep4_problem(constraints={"odd": "sqrt(chi_B - 1.2) >= 0.1", "log": "log(Fr - 1) >= -2"})
+    tmsopt.solve(asked, linear_solver=linear_solver, throw=False)
+    assert capfd.readouterr() == ("", "")
 
 
 def test_other_linear_solvers_are_refused():
@@ -308,7 +249,7 @@ def test_seeded_runs_are_identical_and_threads_do_not_share_solvers():
 
 
 def test_no_mass_matrix_is_said_and_is_no_traceback():
-    design = tmsopt.solve(ep4_problem(fixed={"chi_H": 1.0, "mu": 0.1, "zeta_B": 0.0, "zeta_H": -0.2}), throw=False)
+    design = tmsopt.solve(ep4_problem(fixed={"zeta_B": 0.0}), throw=False)
     assert design.status == "infeasible"
     assert "a0" in design.violations
     assert any("mass matrix is singular" in note for note in design.notes)
@@ -343,13 +284,9 @@ def test_evaluation_of_the_benchmark():
 def test_si_problem_finds_the_dimensionless_design():
     w, m_B, g = 1.1, 12.0, 9.81
     speed = math.sqrt(g * w)
-    problem = tmsopt.Problem(
-        TMS,
-        fixed={"w": w, "m_B": m_B, "m_H": 1.2, "z_B": -0.4 * w, "x_H": w, "z_H": -0.2 * w},
-        free={"v": (0.01 * speed, 10 * speed), "x_B": (1.01 * w, 5 * w), "lambda_s": (0.02, 1.4)},
-        minimize="abscissa",
-    )
-    design = tmsopt.solve(problem)
+    fixed = {"w": w, "m_B": m_B, "m_H": 1.2, "z_B": -0.4 * w, "x_H": w, "z_H": -0.2 * w}
+    free = {"v": (0.01 * speed, 10 * speed), "x_B": (1.01 * w, 5 * w), "lambda_s": (0.02, 1.4)}
+    design = tmsopt.solve(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="abscissa"))
     assert design.parameters["v"] == pytest.approx(EP4["Fr"] * speed, rel=1e-12)
     assert design.parameters["x_B"] == pytest.approx(EP4["chi_B"] * w, rel=1e-12)
     assert design.parameters["g"] == 9.81
@@ -357,24 +294,23 @@ def test_si_problem_finds_the_dimensionless_design():
     assert design.structure == "EP4"
 
 
+RANGES = {
+    "Fr": (0.1, 5),
+    "mu": (0.01, 20),
+    "chi_B": (0.5, 3),
+    "chi_H": (1.0, 1.3),
+    "zeta_B": (-1.5, -0.1),
+    "zeta_H": (-1, -0.05),
+    "lambda_s": (0.05, 1.2),
+}
+
+
 def test_bound_holds_on_random_designs():
     """No random design of the box is below the instant bound (invariant), and the bound is attained by ω0 there."""
     rng = np.random.default_rng(5)
     for _ in range(20):
-        free = {}
-        for name, low, high in (
-            ("Fr", 0.1, 5),
-            ("mu", 0.01, 20),
-            ("chi_B", 0.5, 3),
-            ("chi_H", 1.0, 1.3),
-            ("zeta_B", -1.5, -0.1),
-            ("zeta_H", -1, -0.05),
-            ("lambda_s", 0.05, 1.2),
-        ):
-            a, b = sorted(rng.uniform(low, high, 2))
-            free[name] = (a, b)
-        problem = tmsopt.Problem(TMS, free=free, minimize="abscissa")
-        bound = omega0_bound(problem.posed, 0.0).value
+        free = {n: tuple(sorted(rng.uniform(*ends, 2))) for n, ends in RANGES.items()}
+        bound = omega0_bound(skate(free, minimize="abscissa").posed, 0.0).value
         columns = {n: rng.uniform(a, b, 4000) for n, (a, b) in free.items()}
         a = np.moveaxis(laws.copo(**columns), 0, -1)
         omega = np.abs(a[:, 4] / a[:, 0]) ** 0.25
@@ -386,13 +322,9 @@ def test_bound_holds_on_random_designs():
 @pytest.mark.slow
 def test_two_limits_on_the_damping_ratio_both_hold_whichever_comes_first():
     """The weaker of two limits changes nothing; neither does the order in which they are written."""
-    weak, strong, fast = (
-        {"weak": "damping_ratio >= 0.3"},
-        {"strong": "damping_ratio >= 0.9"},
-        {"fast": "abscissa <= -0.5"},
-    )
-    asked = ({**strong, **fast}, {**weak, **strong, **fast}, {**strong, **weak, **fast})
-    found = [tmsopt.solve(ep4_problem(minimize="Fr", constraints=constraints)) for constraints in asked]
+    limits = {"weak": "damping_ratio >= 0.3", "strong": "damping_ratio >= 0.9", "fast": "abscissa <= -0.5"}
+    orders = (["strong", "fast"], ["weak", "strong", "fast"], ["strong", "weak", "fast"])
+    found = [tmsopt.solve(ep4_problem(minimize="Fr", constraints={n: limits[n] for n in order})) for order in orders]
     for design in found:
         assert design.quantities["damping_ratio"] == pytest.approx(0.9, abs=1e-9)
         assert design.value == pytest.approx(found[0].value, rel=1e-10)

@@ -5,7 +5,6 @@ import time
 from dataclasses import replace
 from importlib import import_module
 
-import casadi as ca
 import pytest
 
 import tmsopt
@@ -16,17 +15,14 @@ solving = import_module("tmsopt.search.solve")
 
 scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 
-X = ca.SX.sym("x")
 NONE = "no design within the ranges is stable (proved)"
 BOUND = "no design within the ranges is stable and satisfies the constraints (proved)"
 UNKNOWN = "no stable design was found, but not proved that none exists"
 
 
-def found(most, coefficients=(1, X - 2, 1), stability=10.0, **asked):
-    problem = tmsopt.Problem(
-        from_coefficients(list(coefficients)), free={"x": (0, most)}, **{"minimize": "abscissa", **asked}
-    )
-    return tmsopt.solve(problem, throw=False, stability=stability)
+def found(most, coefficients=(1, "x - 2", 1), stability=10.0, **asked):
+    model, asked = from_coefficients(list(coefficients)), {"minimize": "abscissa", **asked}
+    return tmsopt.solve(tmsopt.Problem(model, free={"x": (0, most)}, **asked), throw=False, stability=stability)
 
 
 def headline(design):
@@ -38,7 +34,7 @@ def headline(design):
 
 @pytest.mark.parametrize("x", [1.0, 2.0, 3.0])
 def test_a_given_design(x):
-    design = tmsopt.solve(tmsopt.Problem(from_coefficients([1, X - 2, 1]), fixed={"x": x}))
+    design = tmsopt.solve(tmsopt.Problem(from_coefficients([1, "x - 2", 1]), fixed={"x": x}))
     assert design.stable is (x > 2)
     assert design.to_json()["stable"] is (x > 2)
 
@@ -69,29 +65,19 @@ def test_at_the_edge_nothing_is_proved():
     assert headline(design) == f"marginally stable; {UNKNOWN}"
 
 
-def test_what_is_not_asked_is_not_known():
-    design = found(1.0, stability=0.0)
-    assert design.any_stable is None
-    assert headline(design) == f"not stable: {UNKNOWN}"
-
-
-def test_a_root_at_0_needs_no_search():
-    """The product of the roots is 0, so one of them is: the instant bound says so."""
-    design = found(3.0, (1, X, 1, 0), stability=0.0)
-    assert (design.stable, design.any_stable) == (False, False)
-    assert headline(design) == f"marginally stable; {NONE}"
-
-
-def test_a_stable_design_is_one():
-    design = found(3.0)
-    assert (design.stable, design.any_stable) == (True, True)
-    assert headline(design) == "stable"
-
-
-def test_who_does_not_ask_for_stability_is_told_of_none():
-    design = found(3.0, minimize="x")
-    assert (design.stable, design.any_stable) == (False, None)
-    assert headline(design) == "not stable"
+@pytest.mark.parametrize(
+    ("most", "asked", "stable", "any_stable", "words"),
+    [
+        (1.0, {"stability": 0.0}, False, None, f"not stable: {UNKNOWN}"),  # what is not asked is not known
+        # The product of the roots is 0, so one of them is: the instant bound says so.
+        (3.0, {"coefficients": (1, "x", 1, 0), "stability": 0.0}, False, False, f"marginally stable; {NONE}"),
+        (3.0, {}, True, True, "stable"),
+        (3.0, {"minimize": "x"}, False, None, "not stable"),  # who does not ask for stability is told of none
+    ],
+)
+def test_what_is_known_without_a_search(most, asked, stable, any_stable, words):
+    design = found(most, **asked)
+    assert (design.stable, design.any_stable, headline(design)) == (stable, any_stable, words)
 
 
 @scip

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.problem.problem import Posed
+from tmsopt.problem import Posed
 from tmsopt.program.formulate import design_of
 from tmsopt.program.ipopt import make_polisher
 from tmsopt.search.state import CheckedEnd, LocalEnd, SearchState, clip_to_box, same_objective

@@ -3,28 +3,27 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any, Unpack
 
 import numpy as np
 
-from tmsopt.errors import Fault, InputError, is_number, short
+from tmsopt.errors import input_error, is_number, short
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.global_search.completeness import SECONDS, Completeness, prove_completeness
-from tmsopt.problem.files import Given, pose
-from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.problem.problem import Posed
-from tmsopt.problem.solution import Solution
+from tmsopt.global_search import Completeness, prove_completeness
+from tmsopt.global_search.completeness import SECONDS
+from tmsopt.problem import Given, Posed, Solution, degrees_of_freedom, pose
 from tmsopt.problem.validate import SMALLEST
-from tmsopt.program.formulate import design_of, formulate_matching
-from tmsopt.program.nlp import NLP
-from tmsopt.program.options import CommonOptions, Options, documents_options, make_options
+from tmsopt.program import NLP, CommonOptions, Options, formulate_matching, make_options
+from tmsopt.program.formulate import design_of
+from tmsopt.program.options import documents_options
 from tmsopt.program.starts import complete_starts, sample_box
 from tmsopt.progress import begin
 from tmsopt.records import Array, Table, Tabular, plain
 from tmsopt.search.local_search import solve_from
 from tmsopt.search.newton import build_square_system, estimate_error, find_zero, make_zero
 from tmsopt.search.solve import solve_any_status
-from tmsopt.search.state import SearchState, Start, clip_to_box
+from tmsopt.search.state import SearchState, Start, clip_to_box, is_close
 
 MOST = 1024
 """Largest number of starts."""
@@ -144,92 +143,89 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Com
     """
     problem = pose(problem)
     if not is_number(seconds):
-        raise InputError([Fault(f"found {short(seconds)}; accepted: a number of seconds", ("seconds",))])
+        raise input_error(f"found {short(seconds)}; accepted: a number of seconds", "seconds")
     nlp = _build_equations(problem)
     state = SearchState(problem, problem, nlp, make_options(options, defaults=_DEFAULTS))
     begin(state.options.progress, "proving that no design is missed", "s")
     proof = prove_completeness(problem, seconds, state.options.progress) if seconds > 0 else None
-    proved_designs = proof.designs if proof else ()
-    proved = [np.array([*clip_to_box(problem, {n: float(x) for n, x in d.items()}).values()]) for d in proved_designs]
-    finished = proof is not None and (proof.complete or proof.stopped)
-    found, errors, coverage = ([], [], None) if finished else _search_starts(problem, nlp, state)
-    width = np.array([hi - lo for lo, hi in problem.free.values()])
-    new = [x for x in proved if not any(_is_same(x, y, width) for y in found)]
+    proved = list[_Found]()
+    for at in proof.designs if proof else ():
+        errors = {n: float(x.radius) for n, x in at.items()} | {"abscissa": 0.0}
+        proved.append(_Found(_drop_tiny(clip_to_box(problem, {n: float(x) for n, x in at.items()})), errors))
+    found, coverage = ([], None) if proof and (proof.complete or proof.stopped) else _search_starts(state)
+    new = [one for one in proved if not any(one.is_same(problem, other) for other in found)]
     if coverage:
-        coverage = replace(coverage, hits=(*coverage.hits, *(0 for _ in new)))
-    radii = [{n: float(x.radius) for n, x in design.items()} for design in proved_designs]
+        coverage = replace(coverage, hits=(*coverage.hits, *[0] * len(new)))
     solutions, exists, bounds = list[Solution](), list[bool](), list[Table[float]]()
-    for x, own in zip([*found, *new], [*errors, *({} for _ in new)], strict=True):
-        matches = [radius for y, radius in zip(proved, radii, strict=True) if _is_same(x, y, width)]
-        solutions.append(_make_solution(problem, _name_parameters(problem, x)))
+    for one in (*found, *new):
+        solution = _make_solution(problem, one.design)
+        matches = [other for other in proved if one.is_same(problem, other)]
+        errors = one.errors | (matches[0].errors if matches else {})
+        size = max((r.size for r in solution.roots), default=0.0)
+        least = {n: abs(solution.parameters[n]) for n in problem.free} | {"abscissa": size}
+        solutions.append(solution)
         exists.append(bool(matches))
-        bounds.append(_combine_errors(solutions[-1], own, matches[0] if matches else {}))
+        bounds.append(Table({n: max(errors.get(n, 0.0), _ROUNDING * x) for n, x in least.items()}))
     return Every(tuple(solutions), coverage, proof, tuple(exists), tuple(bounds))
 
 
-def _combine_errors(solution: Solution, own: Mapping[str, float], radius: Mapping[str, float]) -> Table[float]:
-    """Error bounds of a solution: from the proof, else from the search; at least the rounding of doubles and roots."""
-    size = max((r.size for r in solution.roots), default=0.0)
-    least = {n: abs(solution.parameters[n]) for n in solution.problem.free} | {"abscissa": size}
-    errors = {**own, **radius, **({"abscissa": 0.0} if radius else {})}
-    return Table({n: max(errors.get(n, 0.0), _ROUNDING * x) for n, x in least.items()})
+@dataclass(eq=False)
+class _Found:
+    """A solution: its free parameters, error bounds of these and of the abscissa, the starts that led to it."""
+
+    design: dict[str, float]
+    errors: dict[str, float]
+    hits: int = 0
+
+    def is_same(self, problem: Posed, other: "_Found") -> bool:
+        return is_close(problem, self.design, other.design, _SAME)
 
 
-def _search_starts(
-    problem: Posed, nlp: NLP, state: SearchState
-) -> tuple[list[Array], list[dict[str, float]], Coverage]:
-    """Solutions found from many starts, the most frequent first, with their errors and the coverage."""
-    starts, progress = state.options.starts, state.options.progress
+def _search_starts(state: SearchState) -> tuple[list[_Found], Coverage]:
+    """Solutions found from many starts, the most frequent first, and the coverage."""
+    problem, nlp, starts, progress = state.problem, state.nlp, state.options.starts, state.options.progress
     begin(progress, "searching", "start")
     system = build_square_system(nlp)
     assert system is not None  # as many conditions as parameters
-    width = np.array([hi - lo for lo, hi in problem.free.values()])
-    found: list[Array] = []
-    errors: list[dict[str, float]] = []
-    hits: list[int] = []
+    found = list[_Found]()
     done = singular = crossings = 0
-    for design in sample_box(problem, state.options.seed):
-        if done >= starts or _is_covered(done, hits):
+    for start in islice(sample_box(problem, state.options.seed), starts):
+        if _is_covered(done, [one.hits for one in found]):
             break
-        ends = [find_zero(system, x) for x in complete_starts(nlp, problem, design)]
-        if done % _IPOPT_EVERY == 0:
-            local = solve_from(state, Start(design, near=False))
-            ends.append((find_zero(system, local.run.x) or make_zero(system, local.run.x)) if local.feasible else None)
-        reached: set[int] = set()
+        ends = [find_zero(system, x) for x in complete_starts(nlp, problem, start)]
+        if done % _IPOPT_EVERY == 0 and (local := solve_from(state, Start(start, near=False))).feasible:
+            ends.append(find_zero(system, local.run.x) or make_zero(system, local.run.x))
+        reached = set[_Found]()
         doubtful = crossed = False
-        for end in ends:
-            point = None if end is None else _take_parameters(problem, nlp, end.x)
-            if end is None or point is None:
+        for end in filter(None, ends):
+            design = _take_design(problem, nlp, end.x)
+            if design is None:
                 continue
+            one = _Found(design, {})
+            known = next((other for other in found if one.is_same(problem, other)), None)
+            if end.isolated and known:
+                reached.add(known)
+                continue
+            checked = recheck(problem, problem.ordered(design))
             if not end.isolated:
-                checked = recheck(problem, problem.ordered(_name_parameters(problem, point)))
                 doubtful, crossed = doubtful or not checked.violations, crossed or checked.crossing
-                continue
-            row = next((k for k, other in enumerate(found) if _is_same(point, other, width)), None)
-            if row is None:
-                if recheck(problem, problem.ordered(_name_parameters(problem, point))).violations:
-                    continue
-                row = len(found)
-                found.append(point)
-                errors.append(_name_errors(problem, estimate_error(system, end.x)))
-                hits.append(0)
-            reached.add(row)
-        for k in reached:
-            hits[k] += 1
+            elif not checked.violations:
+                # An angle's error is at most its tangent's; the other variables are the factors' coefficients.
+                errors = estimate_error(system, end.x).tolist()
+                one.errors = dict(zip(problem.free, errors, strict=False))
+                one.errors["abscissa"] = max(errors[len(problem.free) :], default=0.0)
+                found.append(one)
+                reached.add(one)
+        for one in reached:
+            one.hits += 1
         singular += doubtful and not reached
         crossings += crossed and not reached
         done += 1
         if progress:
             progress(done, starts)
-    order = np.argsort([-h for h in hits], kind="stable")
-    coverage = estimate_coverage(done, [hits[k] for k in order], singular)
-    return [found[k] for k in order], [errors[k] for k in order], replace(coverage, crossings=crossings)
-
-
-def _name_errors(problem: Posed, errors: Array) -> dict[str, float]:
-    """Errors by name: of the free parameters and of the abscissa. An angle's error is at most its tangent's."""
-    own = dict(zip(problem.free, errors.tolist(), strict=False))
-    return own | {"abscissa": max(errors[len(own) :].tolist(), default=0.0)}
+    found.sort(key=lambda one: -one.hits)
+    coverage = estimate_coverage(done, [one.hits for one in found], singular)
+    return found, replace(coverage, crossings=crossings)
 
 
 def _build_equations(problem: Posed) -> NLP:
@@ -237,43 +233,34 @@ def _build_equations(problem: Posed) -> NLP:
     counted = degrees_of_freedom(problem)
     if problem.pattern is None or problem.objective is not None:
         order = min(max(len(problem.free) + 1, 2), problem.model.degree)  # as many conditions as free parameters
-        message = f"needs a pattern and no objective; write e.g. locate = 'EP{order}' instead of minimize or maximize"
-        raise InputError([Fault(message, ("objective",))])
+        needed = f"needs a pattern and no objective; write e.g. locate = 'EP{order}' instead of minimize or maximize"
+        raise input_error(needed, "objective")
     if problem.cases:
-        message = "scenarios and tolerances leave no isolated solutions; remove them"
-        raise InputError([Fault(message, ("parameters",))])
+        raise input_error("scenarios and tolerances leave no isolated solutions; remove them", "parameters")
     if counted.kind != "square":
         advice = "free fewer, or add == constraints" if counted.count > 0 else "free more, or drop conditions"
         free = f"{counted.free} free parameter{'' if counted.free == 1 else 's'}"
         conditions = f"{counted.conditions} condition{'' if counted.conditions == 1 else 's'}"
-        message = f"{free} and {conditions} do not give isolated solutions; {advice}"
-        raise InputError([Fault(message, ("parameters",))])
+        raise input_error(f"{free} and {conditions} do not give isolated solutions; {advice}", "parameters")
     nlp = formulate_matching(problem)
     if nlp.contacts:
         found = f"the constraints use {', '.join(nlp.contacts)}, which only the roots define"
         accepted = "parameters, coefficients, and quantities with a formula in these"
         advice = "rewrite the constraints, or use solve, which finds one design and names other solutions"
-        raise InputError([Fault(f"{found}; accepted: {accepted}; {advice}", ("constraints",))])
+        raise input_error(f"{found}; accepted: {accepted}; {advice}", "constraints")
     return nlp
 
 
-def _is_same(one: Array, other: Array, width: Array) -> bool:
-    return bool(np.max(np.abs(one - other) / width) <= _SAME)
+def _drop_tiny(design: Mapping[str, float]) -> dict[str, float]:
+    """Numbers too small for a problem become 0."""
+    return {n: x if abs(x) >= SMALLEST else 0.0 for n, x in design.items()}
 
 
-def _name_parameters(problem: Posed, point: Array) -> dict[str, float]:
-    """Parameters by name; numbers too small for a problem become 0."""
-    return {n: x if abs(x) >= SMALLEST else 0.0 for n, x in zip(problem.free, point.tolist(), strict=True)}
-
-
-def _take_parameters(problem: Posed, nlp: NLP, x: Array) -> Array | None:
+def _take_design(problem: Posed, nlp: NLP, x: Array) -> dict[str, float] | None:
     """The free parameters of a solution in the box; None if it is outside."""
-    lower, upper = (np.array(ends[: len(problem.free)]) for ends in (nlp.lower, nlp.upper))
-    room = _INSIDE * (upper - lower)
-    own = x[: len(problem.free)]
-    if np.any(own < lower - room) or np.any(own > upper + room):
-        return None
-    return np.array(list(design_of(problem, x.tolist()).values()))
+    own, lower, upper = (np.array(values[: len(problem.free)]) for values in (x, nlp.lower, nlp.upper))
+    outside = np.any(np.maximum(lower - own, own - upper) > _INSIDE * (upper - lower))
+    return None if outside else _drop_tiny(design_of(problem, x.tolist()))
 
 
 def _is_covered(done: int, hits: list[int]) -> bool:

@@ -1,4 +1,4 @@
-"""One local search: IPOPT from one start, repeated if it ends badly."""
+"""One local search: IPOPT from one start, repeated if it ends badly; other starts that would lead to the same end."""
 
 import math
 from dataclasses import replace
@@ -7,20 +7,17 @@ from itertools import islice
 import numpy as np
 
 from tmsopt.problem.verdict.meetings import is_crossing
-from tmsopt.program.formulate import design_of
-from tmsopt.program.ipopt import Run, make_ipopt
-from tmsopt.program.nlp import NLP
-from tmsopt.program.starts import initial_point
+from tmsopt.program import NLP, initial_point
+from tmsopt.program.ipopt import make_ipopt
 from tmsopt.records import Array
 from tmsopt.roots import roots
-from tmsopt.search.starts import add_led_designs
-from tmsopt.search.state import LocalEnd, SearchState, Start, coefficients_at
+from tmsopt.search.state import LocalEnd, SearchState, Start
+from tmsopt.search.stopping import is_proven
 
 
 def solve_from(state: SearchState, start: Start) -> LocalEnd:
     """Solve from one start; if IPOPT does not converge, factor the roots anew and go on while that helps."""
-    tuning, nlp = state.tuning, state.nlp
-    exact = bool(nlp.cases) and nlp.exact
+    tuning, exact = state.tuning, state.nlp.cases and state.nlp.exact
     best = run_once(state, start, "near" if start.near else "exact" if exact else "far")
     for again in range(tuning.restarts):
         converged = (
@@ -33,7 +30,7 @@ def solve_from(state: SearchState, start: Start) -> LocalEnd:
         if best.feasible and (not end.feasible or end.objective >= best.objective - tuning.same):
             break
         best = end
-    return add_led_designs(state, keep_to_start(state, start, exchange_contacts(state, best)))
+    return _add_led_designs(state, keep_to_start(state, start, exchange_contacts(state, best)))
 
 
 def count_restarts(state: SearchState) -> int:
@@ -55,8 +52,8 @@ def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
     """The end, or the end of a run with other settings if the start was better."""
     if state.sample is None or not best.feasible:
         return best
-    box, leaders, known = state.sample.box, state.sample.leaders, start.row >= 0
-    seen = leaders.take(np.array([start.row])) if known else box.judge_points(box.space.points(start.design)[None])
+    box = state.sample.box
+    seen = box.judge_points(box.space.points(start.design)[None])
     if seen.violation[0] > 0 or seen.objective[0] >= best.objective - state.tuning.same:
         return best
     kept = run_once(state, start, "far" if start.near else "near")
@@ -66,8 +63,8 @@ def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
 def exchange_contacts(state: SearchState, best: LocalEnd) -> LocalEnd:
     """The best end over other ways of holding root quantities that are as close as the current one."""
     for _ in range(state.tuning.exchanges if state.nlp.contacts and best.feasible else 0):
-        x, held = best.run.x, _limits(best.nlp)
-        others = (way for way in state.nlp.impose_contacts(x, state.tuning.meets) if _limits(way) != held)
+        x = best.run.x
+        others = (way for way in state.nlp.impose_contacts(x, state.tuning.meets) if way != best.nlp)
         ends = [_run_ipopt(state, best.start, x, way, "near") for way in islice(others, 2 * state.tuning.ways)]
         other = min(ends, key=lambda end: end.rank, default=best)
         if not (other.feasible and other.objective < best.objective - state.tuning.same):
@@ -79,33 +76,55 @@ def exchange_contacts(state: SearchState, best: LocalEnd) -> LocalEnd:
 def _run_ipopt(state: SearchState, start: Start, x: Array, limits: NLP, settings: str) -> LocalEnd:
     """Run IPOPT once and judge its end."""
     run = make_ipopt(state.nlp, state.options, settings)(x, limits)
+    end = LocalEnd(start, limits, run, math.inf, False)
     f, rows = limits.evaluate(run.x)
-    if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(run.x)) and math.isfinite(f)):
-        return LocalEnd(start, limits, run, math.inf, False)
+    if not np.all(np.isfinite([f, *rows, *run.x])):
+        return end
     outside = np.maximum(np.array(limits.row_lower) - rows, rows - np.array(limits.row_upper)).clip(0)
-    feasible = outside.max(initial=0.0) <= state.tuning.feasible and run.status != "Infeasible_Problem_Detected"
     # Rows that hold to 1e-12 may hide 1e-6 in a double root, whose square they constrain.
     claim = 2 * float(np.abs(np.nan_to_num(run.row_multipliers)) @ outside) if limits.contacts else 0.0
-    if not feasible or _is_spurious(state, limits, run):
-        return LocalEnd(start, limits, run, f + claim, False)
-    design = state.part.ordered(design_of(state.part, run.x.tolist()))
-    crossing = state.part.pattern is not None and is_crossing(state.part, state.part.pattern, design)
-    return LocalEnd(start, limits, run, f + claim, not crossing, crossing)
+    end, feasible = replace(end, objective=f + claim), outside.max(initial=0.0) <= state.tuning.feasible
+    if not feasible or run.status == "Infeasible_Problem_Detected" or _is_spurious(state, end):
+        return end
+    part, pattern = state.part, state.part.pattern
+    crossing = pattern is not None and is_crossing(part, pattern, part.ordered(state.design_at(end)))
+    return replace(end, feasible=not crossing, crossing=crossing)
 
 
-def _is_spurious(state: SearchState, nlp: NLP, run: Run) -> bool:
+def _is_spurious(state: SearchState, end: LocalEnd) -> bool:
     """Whether the factors claim an abscissa left of the roots: near a0 = 0 all terms of the equations vanish."""
+    nlp = end.nlp
     if "abscissa" not in nlp.variables:
         return False
-    a = coefficients_at(state.part, nlp, run)
+    a = state.coefficients_at(end)
     if np.any(a[:, 0] == 0):
         return True
     z = roots(a)
-    claimed = run.x[nlp.variables.index("abscissa")] * nlp.unit
+    claimed = end.run.x[nlp.variables.index("abscissa")] * nlp.unit
     size = np.maximum(np.abs(z).max(axis=1), nlp.unit)  # all roots may be 0
     scatter = max(state.tuning.scatter, state.tuning.residual ** (1 / state.part.model.degree))
     return bool(np.any(claimed < z.real.max(axis=1) - scatter * size))
 
 
-def _limits(nlp: NLP) -> tuple[tuple[float, ...], ...]:
-    return nlp.lower, nlp.upper, nlp.row_upper
+def _add_led_designs(state: SearchState, end: LocalEnd) -> LocalEnd:
+    """Add to an end the sampled designs that lead straight down to it and to no earlier end."""
+    if not (state.sample and end.feasible and state.part.objective) or state.options.exhaustive:
+        return end
+    tuning, leaders, box = state.tuning, state.sample.leaders, state.sample.box
+    place = box.space.points(state.design_at(end))
+    known = (box.space.points(state.design_at(other)) for other in state.feasible)
+    if is_proven(state, end) or any(np.abs(place - other).max() <= tuning.same for other in known):
+        return end  # the search ends here, or an earlier end has the same design
+    rows = [row for row in state.left if row != end.start.row]
+    seen, near = leaders.take(np.array(rows, dtype=int)), tuning.same * (end.nlp.size + abs(end.objective))
+    if not rows:
+        return end
+    shares = np.arange(1, 8)[:, None] / 8
+    path = box.judge_points((seen.u[:, None] + shares * (place - seen.u[:, None])).reshape(-1, box.space.size))
+    objective, violation = (x.reshape(len(rows), -1) for x in (path.objective, path.violation))
+    gain = seen.objective - end.objective
+    heights = np.concatenate([seen.objective[:, None], objective], axis=1)
+    falls = np.all(heights[:, 1:] <= heights[:, :-1] + (tuning.level * np.abs(gain) + near)[:, None], axis=1)
+    down = falls & (gain >= -near) & np.isfinite(seen.objective) & (violation.max(axis=1) <= seen.violation)
+    down |= (np.abs(gain) <= near) & (seen.violation == 0)
+    return replace(end, led=frozenset(np.array(rows)[down].tolist()))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from tmsopt.program.nlp import NLP
+from tmsopt.program import NLP
 from tmsopt.records import Array
 
 _STEPS = 60

@@ -6,19 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tmsopt.evaluation import find_worst_cases
 from tmsopt.evaluation.bound import instant_bound, minimizes_abscissa
 from tmsopt.evaluation.recheck import Evaluation, recheck
-from tmsopt.evaluation.worst_case import Worst, find_worst_cases
-from tmsopt.problem.advice.remedies import Relaxation
-from tmsopt.problem.cases import Case
-from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.problem.problem import Posed
-from tmsopt.problem.searches import Starts
+from tmsopt.evaluation.worst_case import Worst
+from tmsopt.problem import Case, Posed, Relaxation, Starts, degrees_of_freedom
 from tmsopt.problem.solution import OtherBranch
-from tmsopt.program.formulate import formulate_by_factors, formulate_matching
+from tmsopt.program import NLP, choose_starts, formulate_by_factors, formulate_matching, initial_point
 from tmsopt.program.ipopt import Point, relaxation_gain
-from tmsopt.program.nlp import NLP
-from tmsopt.program.starts import choose_starts, initial_point
 from tmsopt.records import Array, Table
 from tmsopt.roots import Root
 from tmsopt.search.acceptance import claim_matches, has_converged, recheck_inside_box
@@ -72,28 +67,25 @@ def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None
     problem, trial = state.problem, recheck_inside_box(state, state.best)
     parameters, nlp = trial.parameters, trial.end.nlp
     checked = trial.checked if cases is None else recheck(problem, parameters, cases)
-    counted = degrees_of_freedom(problem)
+    counted, violated = degrees_of_freedom(problem), bool(checked.violations)
     if sum(checked.violations.values()) > state.tuning.spurious and counted.count >= 0:
         return None
-    notes = _find_doubts(problem, trial, checked)
-    optimal = has_converged(trial) and not notes
-    if not (optimal or notes or checked.violations) and minimizes_abscissa(
-        problem
-    ):  # no gradient shows it on a plateau
-        optimal = instant_bound(problem, checked.objective).proven
-    status = "optimal" if optimal and not checked.violations else "not_converged"
-    if status != "optimal" and not notes and not checked.violations:
-        notes = ("feasible, but the solver did not converge: a better design may be close",)
-    if counted.kind == "over-determined" and checked.violations:
+    notes, status = _find_doubts(problem, trial, checked), "not_converged"
+    if not (notes or violated):
+        # No gradient shows an optimum on a plateau.
+        plateau = minimizes_abscissa(problem) and instant_bound(problem, checked.objective).proven
+        if has_converged(trial) or plateau:
+            status = "optimal"
+        else:
+            notes = ("feasible, but the solver did not converge: a better design may be close",)
+    if counted.kind == "over-determined" and violated:
         status = "infeasible"
         surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
         notes += (f"{surplus} are inconsistent{_suggest_balance(problem, -counted.count)}",)
     branches: tuple[OtherBranch, ...] = ()
     if counted.kind == "square":
-        equations = (
-            nlp if not nlp.kinks else formulate_matching(problem) if problem.pattern else formulate_by_factors(problem)
-        )
-        branches = _find_other_branches(problem, equations, parameters)
+        equations = formulate_matching(problem) if problem.pattern else formulate_by_factors(problem)
+        branches = _find_other_branches(problem, nlp if not nlp.kinks else equations, parameters)
     active = _find_active_limits(problem, nlp, trial.point)
     checked_cases = tuple(nlp.cases if cases is None else cases)
     return Outcome(parameters, checked, status, active, starts, nlp.formulation, checked_cases, branches, notes)
@@ -139,15 +131,27 @@ def write_mass_advice(problem: Posed) -> str:
     return f"keep {known.get(problem.model.name, 'a0')} away from 0 by a constraint"
 
 
-def is_better_outcome(problem: Posed, one: Outcome, other: Outcome, tuning: Tuning) -> bool:
+def choose_outcome(problem: Posed, outcomes: Sequence[Outcome | None], tuning: Tuning) -> Outcome | None:
+    """The best outcome; None if there is none."""
+    best: Outcome | None = None
+    for outcome in outcomes:
+        if outcome and (best is None or _is_better(problem, outcome, best, tuning)):
+            best = outcome
+    return best
+
+
+def _is_better(problem: Posed, one: Outcome, other: Outcome, tuning: Tuning) -> bool:
     """Whether one outcome beats another: feasible first, then by objective, then optimal first."""
-    values = [problem.sign * o.checked.objective for o in (one, other)]
-    doubtful = [bool(o.checked.violations) or math.isinf(v) for o, v in zip((one, other), values, strict=True)]
-    close = math.isclose(*values, rel_tol=tuning.claimed)
-    if not any(doubtful) and all(map(math.isfinite, values)) and not close:
-        return values[0] < values[1]
-    finite = [v if math.isfinite(v) else 0.0 for v in values]
-    return (doubtful[0], one.status != "optimal", finite[0]) < (doubtful[1], other.status != "optimal", finite[1])
+    a, b = (problem.sign * outcome.checked.objective for outcome in (one, other))
+    sound = not (one.checked.violations or other.checked.violations)
+    if sound and math.isfinite(a) and math.isfinite(b) and not math.isclose(a, b, rel_tol=tuning.claimed):
+        return a < b
+
+    def rank(outcome: Outcome, value: float) -> tuple[bool, bool, float]:
+        doubtful = bool(outcome.checked.violations) or math.isinf(value)
+        return doubtful, outcome.status != "optimal", value if math.isfinite(value) else 0.0
+
+    return rank(one, a) < rank(other, b)
 
 
 def is_unclear(problem: Posed, checked: Evaluation) -> bool:
@@ -173,57 +177,50 @@ def _find_active_limits(problem: Posed, nlp: NLP, point: Point) -> dict[str, flo
     For an equality constraint: the change of the objective per unit added to its right-hand side. For a constraint that
     holds in several cases: the gain of relaxing it in all of them.
     """
-    active: dict[str, float] = {}
     if problem.objective is None:
-        return active
-    sign, gain = problem.sign, relaxation_gain(nlp, point)
-    rows = zip(nlp.rows, point.row_multipliers.tolist(), nlp.row_lower, nlp.row_upper, strict=True)
-    inequalities: dict[str, list[int]] = {}
-    for k, (row, multiplier, lower, upper) in enumerate(rows):
+        return {}
+    gain, active, inequalities = relaxation_gain(nlp, point), dict[str, float](), dict[str, list[int]]()
+    for k, (row, multiplier) in enumerate(zip(nlp.rows, point.row_multipliers.tolist(), strict=True)):
         if row in problem.constraints and abs(multiplier) > _MULTIPLIER:
-            if lower == upper:
-                active[row] = active.get(row, 0.0) - sign * multiplier
+            if nlp.row_lower[k] == nlp.row_upper[k]:
+                active[row] = active.get(row, 0.0) - problem.sign * multiplier
             else:
                 inequalities.setdefault(row, []).append(k)
-    active |= {name: gain(limits) for name, limits in inequalities.items()}
-    of = problem.parameter_set
-    for k, name in enumerate(problem.free):
-        multiplier, x = float(point.bound_multipliers[k]), float(point.x[k])
-        ends = [float(np.tan(e)) if of[name].tangent else e for e in problem.free[name]]
-        apart = _TOUCHES * (ends[1] - ends[0])
-        at_end = min(abs(x - e) for e in ends) <= apart  # 0 may bound a part of the box only
-        if abs(multiplier) > _MULTIPLIER and at_end:
-            slope = 1 + x * x if of[name].tangent else 1.0  # d tan λ/dλ
-            end = "max" if abs(x - ends[1]) < abs(x - ends[0]) else "min"
-            active[f"{name}.{end}"] = gain([len(nlp.rows) + k]) * slope
+    active |= {name: gain(rows) for name, rows in inequalities.items()}
+    for k, (name, ends) in enumerate(problem.free.items()):
+        x, tangent = float(point.x[k]), problem.parameter_set[name].tangent
+        lower, upper = (float(np.tan(end)) if tangent else end for end in ends)
+        below, above = abs(x - lower), abs(x - upper)
+        at_end = min(below, above) <= _TOUCHES * (upper - lower)  # 0 may bound a part of the box only
+        if abs(point.bound_multipliers[k]) > _MULTIPLIER and at_end:
+            slope = 1 + x * x if tangent else 1.0  # d tan λ/dλ
+            active[f"{name}.{'max' if above < below else 'min'}"] = gain([len(nlp.rows) + k]) * slope
     return active
 
 
 def _find_other_branches(problem: Posed, nlp: NLP, found: Mapping[str, float]) -> tuple[OtherBranch, ...]:
     """Other solutions of the equations, each with the bounds and rows that it violates."""
-    of = problem.parameter_set
-    branches: list[OtherBranch] = []
-    known = [np.array([found[n] for n in problem.free])]
+    branches, names = list[OtherBranch](), list(problem.free)
+    tangent = [problem.parameter_set[n].tangent for n in names]
+    known = [np.array([found[n] for n in names])]
     starts = (initial_point(nlp, problem, start) for start in choose_starts(problem, 0, _BRANCH_STARTS))
-    for x in find_solutions(nlp, starts, len(problem.free)):
-        values = np.array([np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x, strict=False)])
-        if any(np.abs(values - k).max() <= _SAME_BRANCH * (1 + np.abs(k).max()) for k in known):
-            continue
-        known.append(values)
-        parameters = problem.ordered(dict(zip(problem.free, values.tolist(), strict=True)))
-        branches.append(OtherBranch(Table(parameters), _find_violated_limits(problem, nlp, x)))
+    for x in find_solutions(nlp, starts, len(names)):
+        values = np.where(tangent, np.arctan(x[: len(names)]), x[: len(names)])
+        if all(np.abs(values - k).max() > _SAME_BRANCH * (1 + np.abs(k).max()) for k in known):
+            known.append(values)
+            parameters = problem.ordered(dict(zip(names, values.tolist(), strict=True)))
+            branches.append(OtherBranch(Table(parameters), _find_violated_limits(problem, nlp, x)))
     return tuple(sorted(branches, key=lambda b: len(b.excluded_by)))
 
 
 def _find_violated_limits(problem: Posed, nlp: NLP, x: Array) -> tuple[str, ...]:
     """Names of the bounds and inequality rows that a solution violates."""
-    values = (*x, *nlp.evaluate(x)[1])
-    lower, upper = (*nlp.lower, *nlp.row_lower), (*nlp.upper, *nlp.row_upper)
-    names: dict[str, None] = {}
-    for k, name in enumerate((*problem.free, *nlp.variables[len(problem.free) :], *nlp.rows)):
-        below, above = values[k] < lower[k] - _OUTSIDE, values[k] > upper[k] + _OUTSIDE
-        if below or above:
-            names[name if k >= len(problem.free) else f"{name}.{'min' if below else 'max'}"] = None
+    values, size, names = np.array([*x, *nlp.evaluate(x)[1]]), len(problem.free), dict[str, None]()
+    below = values < np.array([*nlp.lower, *nlp.row_lower]) - _OUTSIDE
+    outside = below | (values > np.array([*nlp.upper, *nlp.row_upper]) + _OUTSIDE)
+    every = (*problem.free, *nlp.variables[size:], *nlp.rows)
+    for k in np.flatnonzero(outside).tolist():
+        names[every[k] if k >= size else f"{every[k]}.{'min' if below[k] else 'max'}"] = None
     return tuple(names)
 
 
@@ -250,18 +247,15 @@ def demote_if_beaten(state: SearchState, outcome: Outcome) -> Outcome:
         return outcome
     box, objective = state.sample.box, problem.sign * outcome.checked.objective
     least = objective - tuning.lost * (state.nlp.size + abs(objective))
-    own = box.space.points(outcome.parameters)
-    points = [box.space.points(design) for design in state.designs]
-    apart = [u for u in points if np.abs(u - own).max() > tuning.same_design]
-    for design in box.designs(
-        box.judge_points(np.array(apart).reshape(-1, box.space.size)).select_better(least).take_best(tuning.rivals_seen)
-    ):
+    points = np.array([box.space.points(design) for design in state.designs]).reshape(-1, box.space.size)
+    apart = np.abs(points - box.space.points(outcome.parameters)).max(axis=1, initial=0.0) > tuning.same_design
+    rivals = box.judge_points(points[apart]).select_better(least).take_best(tuning.rivals_seen)
+    for design in box.designs(rivals):
         other = assess_design(problem, design, BEATEN)
-        merged = abs(
-            other.checked.structure.abscissa - other.checked.realised
-        )  # an abscissa that merged roots may gain
-        sound = not other.checked.violations and not is_unclear(problem, other.checked)
-        if sound and problem.sign * other.checked.objective < least - merged:
+        checked = other.checked
+        merged = abs(checked.structure.abscissa - checked.realised)  # an abscissa that merged roots may gain
+        sound = not checked.violations and not is_unclear(problem, checked)
+        if sound and problem.sign * checked.objective < least - merged:
             return replace(other, starts=outcome.starts, formulation=outcome.formulation)
     return outcome
 
@@ -274,16 +268,18 @@ def has_runaway_root(roots: Sequence[Root], ratio: float) -> bool:
 
 def _is_a0_limited(problem: Posed, outcome: Outcome) -> bool:
     """Whether no free parameter moves a0, or an active limit is on one that does."""
-    limited: set[str] = set()
+    limited = set[str]()
     for name in outcome.active:
         condition = problem.conditions.get(name)
         limited |= set(condition.names) if condition else {name.rpartition(".")[0]}
-    own = float(problem.values(outcome.parameters).coefficients[0])
-    moving = set[str]()
-    for name, (low, high) in problem.free.items():
+
+    def moves_a0(name: str) -> bool:
+        low, high = problem.free[name]
         moved = {**outcome.parameters, name: outcome.parameters[name] + _SHARE * (high - low)}
-        if float(problem.values(moved).coefficients[0]) != own:
-            moving.add(name)
+        one, other = (float(problem.values(p).coefficients[0]) for p in (outcome.parameters, moved))
+        return one != other
+
+    moving = set(filter(moves_a0, problem.free))
     # A quantity may depend on every parameter.
     return not moving or bool(limited & moving or limited - set(problem.free))
 

@@ -9,12 +9,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tmsopt.errors import Fault, InputError, input_error, short, suggest
+from tmsopt.program import NLP
 from tmsopt.program.formulate import default_start
-from tmsopt.program.nlp import NLP
 from tmsopt.progress import begin
 from tmsopt.search.acceptance import is_better
 from tmsopt.search.sample import Sample
-from tmsopt.search.starts import is_led
 from tmsopt.search.state import LocalEnd, SearchState, Start
 from tmsopt.search.tuning import TUNING, Tuning
 
@@ -95,10 +94,8 @@ def check_policy(policy: Any) -> None:
         raise input_error(f"found {short(policy)}; accepted: a tmsopt.Policy, such as tmsopt.POLICY", "policy")
     stages = {name: getattr(policy, name) for name in ("sample", "starts", "local", "accept", "enough")}
     wrong = {name: stage for name, stage in stages.items() if not callable(stage)}
-    if wrong:
-        raise InputError(
-            [Fault(f"found {short(stage)}; accepted: a function", ("policy", n)) for n, stage in wrong.items()]
-        )
+    if faults := [Fault(f"found {short(x)}; accepted: a function", ("policy", name)) for name, x in wrong.items()]:
+        raise InputError(faults)
 
 
 def search(state: SearchState, policy: Policy) -> SearchState:
@@ -122,7 +119,7 @@ def try_starts(state: SearchState, starts: Iterable[Start], policy: Policy, most
     most = most or state.options.starts
     whole = (replace(start, design={**default_start(state.part), **start.design}) for start in starts)
     try:
-        for tried, start in enumerate((s for s in whole if not is_led(state, s)), start=1):
+        for tried, start in enumerate((s for s in whole if not any(s.row in end.led for end in state.ends)), start=1):
             state = replace(state, ends=(*state.ends, policy.local(state, start)))
             if state.options.progress:
                 state.options.progress(tried, most, state.so_far)

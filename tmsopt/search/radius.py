@@ -5,11 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from tmsopt.boundaries.nearest import Nearest, Robustness, find_stability_margins
-from tmsopt.problem.cases import Case, weight_of
-from tmsopt.problem.problem import Posed, radius_parameters
+from tmsopt.boundaries import Robustness, find_stability_margins
+from tmsopt.problem import Case, Posed
+from tmsopt.problem.cases import weight_of
+from tmsopt.problem.evaluate import coefficients_of
+from tmsopt.problem.problem import radius_parameters
 from tmsopt.problem.quantities import RADIUS
-from tmsopt.program.formulate import default_start, formulate
+from tmsopt.program.formulate import formulate
 from tmsopt.records import Array, Table
 from tmsopt.roots import is_stable
 from tmsopt.search.acceptance import accept_best, check_end
@@ -57,7 +59,7 @@ def propose_climbs(state: SearchState) -> Iterator[Start]:
     limits = {name: text for name, text in problem.constraints.items() if RADIUS not in problem.conditions[name].names}
     asked = problem.derive(minimize="abscissa", maximize=None, constraints=limits)
     if problem.start or state.options.near:
-        yield Start({**default_start(problem), **(state.options.near or {})})
+        yield Start(state.options.near or {})
     box = draw_box(asked, state.options.seed, tuning)
     seen = box.draws.take_best(2 * tuning.estimated)
     if np.sum(seen.violation == 0) < tuning.estimated // 4:
@@ -88,18 +90,15 @@ def _has_other_weights(problem: Posed, around: Robustness) -> bool:
 
 def _add_boundary_points(problem: Posed, points: list[Case], around: Robustness, tuning: Tuning) -> list[Case]:
     """The boundary points so far, and the new ones of a design."""
-    near = [n for n in (around.weave, around.capsize, around.infinity) if n.distance <= tuning.beyond * around.radius]
-    found = [_make_boundary_case(problem, n) for n in near]
-    return [
-        *points,
-        *(case for case in found if not any(_is_alike(case, other, tuning.alike_points) for other in points)),
-    ]
-
-
-def _make_boundary_case(problem: Posed, nearest: Nearest) -> Case:
-    """A boundary point in all parameters that the radius varies, also those that are 0 in the design."""
-    names = radius_parameters(problem.parameter_set, problem.weights, problem.fixed)
-    return Case(direction=Table({n: nearest.direction.get(n, 0.0) for n in names}), edge=nearest.kind)
+    found = list(points)
+    for nearest in (around.weave, around.capsize, around.infinity):
+        # In all parameters that the radius varies, also those that are 0 in the design.
+        direction = Table({n: nearest.direction.get(n, 0.0) for n in _list_varied(problem)})
+        case = Case(direction=direction, edge=nearest.kind)
+        near = nearest.distance <= tuning.beyond * around.radius
+        if near and not any(_is_alike(case, other, tuning.alike_points) for other in points):
+            found.append(case)
+    return found
 
 
 def _is_alike(one: Case, other: Case, share: float) -> bool:
@@ -116,18 +115,18 @@ def _move_point(case: Case, k: int, trial: CheckedEnd) -> Case:
 
 def estimate_radii(problem: Posed, columns: Mapping[str, Array], seed: int) -> Array:
     """Upper estimates of the radii of designs, columns of free parameters: how far they stay stable along some rays."""
-    of, nominal = problem.parameter_set, {n: np.asarray(x, dtype=float) for n, x in problem.ordered(columns).items()}
-    names, steps = list(radius_parameters(of, problem.weights, problem.fixed)), np.geomspace(5e-3, 1.5, 20)
+    names, steps = _list_varied(problem), np.geomspace(5e-3, 1.5, 20)
     random = stream(seed, "rays").standard_normal((24, len(names)))
     rays = np.concatenate([np.eye(len(names)), random / np.linalg.norm(random, axis=1, keepdims=True)])
-    moves = (np.concatenate([rays, -rays])[:, None] * steps[:, None]).reshape(-1, len(names))  # (moves, names)
-    sizes = {n: np.where(x == 0, 1.0, np.abs(x)) for n, x in nominal.items()}
-    changed = {n: x[..., None] for n, x in nominal.items()}
-    for n, u in zip(names, moves.T, strict=True):
-        changed[n] = changed[n] + problem.weights.get(n, sizes[n][..., None]) * u
-    with np.errstate(all="ignore"):
-        a = problem.model.coefficients(changed, of)
-        c = np.stack(np.broadcast_arrays(*a, changed[names[0]])[:-1], axis=-1)
-    lost = ~is_stable(c, exact=False).reshape(*c.shape[:-2], -1, len(steps))
-    first = np.where(lost.any(axis=-1), lost.argmax(axis=-1), len(steps) - 1)
-    return np.asarray(steps[first].min(axis=-1) + 1e-3 * steps[first].mean(axis=-1))
+    reached = []
+    for ray in (*rays, *-rays):
+        case = Case(direction=dict(zip(names, ray.tolist(), strict=True)))
+        changed = case.applied(problem.ordered(columns), steps[:, None], problem.weights)
+        a = np.broadcast_arrays(*coefficients_of(problem, changed), *changed.values())[: problem.model.degree + 1]
+        lost = ~is_stable(np.stack(a, axis=-1), exact=False)
+        reached.append(steps[np.where(lost.any(axis=0), lost.argmax(axis=0), len(steps) - 1)])
+    return np.asarray(np.min(reached, axis=0) + 1e-3 * np.mean(reached, axis=0))
+
+
+def _list_varied(problem: Posed) -> tuple[str, ...]:
+    return radius_parameters(problem.parameter_set, problem.weights, problem.fixed)

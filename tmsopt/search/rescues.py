@@ -11,24 +11,19 @@ import numpy as np
 
 from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.models.user_spectrum import full_patterns
-from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.program.formulate import formulate, formulate_matching
-from tmsopt.program.starts import choose_starts
+from tmsopt.problem import degrees_of_freedom
+from tmsopt.program import choose_starts, formulate_matching
+from tmsopt.program.formulate import formulate
 from tmsopt.search.acceptance import check_end, claim_matches, is_better, is_sound
 from tmsopt.search.local_search import run_once
 from tmsopt.search.outcome import KEPT, has_runaway_root, write_mass_advice
 from tmsopt.search.policy import Policy, Rescue, disable_stopping, search_again, try_starts
-from tmsopt.search.sample import DesignBatch, sample_box
+from tmsopt.search.sample import DesignBatch, sample_box, stream
 from tmsopt.search.starts import propose_sample_starts
 from tmsopt.search.state import CheckedEnd, Fallback, SearchState, Start
 from tmsopt.search.stopping import select_distinct_ends
 
 # Roots that meet
-
-
-def has_both_root_limits(state: SearchState) -> bool:
-    """Whether abscissa and damping ratio are both variables: their factors are singular where real roots meet."""
-    return {"abscissa", "damping_ratio"} <= set(state.nlp.variables)
 
 
 def search_real_roots(state: SearchState, policy: Policy) -> SearchState:
@@ -71,8 +66,17 @@ def can_have_positive_roots(state: SearchState) -> bool:
 def search_positive_roots(state: SearchState, policy: Policy) -> SearchState:
     """Search with a damping ratio of −1, without a sector."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=-1.0)
-    few = (state.best and state.nlp.contacts) or (state.problem.maximize or "").strip() == "damping_ratio"
+    few = (state.best and state.nlp.contacts) or (state.problem.sense, state.problem.goal) == (
+        "maximize",
+        "damping_ratio",
+    )
     return search_again(state, policy, nlp=nlp, most=state.tuning.fewer if few else 0)
+
+
+def has_only_crossings(state: SearchState) -> bool:
+    """Whether starts for a pattern with freedom ended only where roots meet without a Jordan chain."""
+    crossing, best = any(end.crossing for end in state.ends), state.best
+    return crossing and (not best or bool(best.checked.violations)) and degrees_of_freedom(state.problem).count > 0
 
 
 def search_other_chains(state: SearchState, policy: Policy) -> SearchState:
@@ -158,7 +162,7 @@ def _propose_near_designs(
     assert state.sample is not None
     box, tuning = state.sample.box, state.tuning
     own = box.space.points(design)
-    random = box.stream("aside").random((tuning.towards, len(own)))
+    random = stream(box.seed, "aside").random((tuning.towards, len(own)))
     towards = np.concatenate([state.sample.refined.u[: tuning.rivals_seen], random])
     seen = box.judge_points((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, len(own)))
     close = (seen.violation == 0) & (np.abs(seen.objective - objective) <= tuning.edge * (1 + abs(objective)))
@@ -217,7 +221,8 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
     assert state.sample is not None
     tuning, box, best = state.tuning, state.sample.box, state.best
     rivals = (find_rivals(state) or state.sample.refined).join(find_singular_rivals(state))
-    few = np.unique([*range(len(rivals))][: tuning.open] + [*range(len(rivals))][-tuning.open :])
+    rows = np.arange(len(rivals))
+    few = np.union1d(rows[: tuning.open], rows[-tuning.open :])
     starts = [Start(design) for design in box.designs(rivals.take(few))]
     starts += [Start(best.parameters)] if best else []
     starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.take_first(tuning.open))]
@@ -230,16 +235,16 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
         reached = min(own.feasible, key=lambda end: end.objective, default=None)
         if reached is None or not reached.objective < least:
             continue
-        rows = [k for k, name in enumerate(nlp.rows) if name == "a0"]
-        singular = bool(nlp.evaluate(reached.run.x)[1][rows].min() < tuning.singular)
+        leads = np.array(nlp.rows) == "a0"
+        singular = bool(nlp.evaluate(reached.run.x)[1][leads].min() < tuning.singular)
         if singular:
-            lower = tuple(tuning.inside if k in rows else limit for k, limit in enumerate(nlp.row_lower))
-            own = state.with_program(replace(nlp, row_lower=lower))
+            lower = np.where(leads, tuning.inside, nlp.row_lower)
+            own = state.with_program(replace(nlp, row_lower=tuple(lower.tolist())))
             own = try_starts(own, [Start(state.design_at(reached))], disable_stopping(policy))
         own = policy.accept(own)
         if own.best is None or own.best.checked.violations or has_merged_roots(own.best):
-            near = best is not None and has_runaway_root(best.checked.structure.roots, tuning.far_root)
-            if best is not None and near and singular and reached.objective < compute_threshold(state):
+            near = best and singular and has_runaway_root(best.checked.structure.roots, tuning.far_root)
+            if best and near and reached.objective < compute_threshold(state):
                 advice = write_mass_advice(state.problem)
                 words = f"a better design may be close to a singular mass matrix (a0 = 0); {advice}"
                 state = replace(state, fallback=Fallback(best.parameters, words))
@@ -268,17 +273,9 @@ def has_merged_roots(trial: CheckedEnd) -> bool:
 
 
 RESCUES = (
-    Rescue(
-        "other chains",
-        "",
-        lambda s: (
-            any(end.crossing for end in s.ends)
-            and (s.best is None or bool(s.best.checked.violations))
-            and degrees_of_freedom(s.problem).count > 0
-        ),
-        search_other_chains,
-    ),
-    Rescue("real roots", "hard 3", has_both_root_limits, search_real_roots),
+    Rescue("other chains", "", has_only_crossings, search_other_chains),
+    # If both are variables, their factors are singular where real roots meet.
+    Rescue("real roots", "hard 3", lambda s: {"abscissa", "damping_ratio"} <= {*s.nlp.variables}, search_real_roots),
     Rescue("positive roots", "hard 7, systems 1, variety 4", can_have_positive_roots, search_positive_roots),
     Rescue("appeals", "sixfold 14", lambda s: bool(find_rivals(s)), restart_from_rivals),
     Rescue("aside", "narrow 14, hard 4, variety 1", has_doubtful_claim, move_aside),

@@ -7,11 +7,12 @@ from itertools import product
 from zlib import crc32
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from tmsopt.algebra.sequence import golden_steps
+from tmsopt.problem import Posed
 from tmsopt.problem.evaluate import coefficients_of
-from tmsopt.problem.problem import Posed
 from tmsopt.program.design_scores import DesignScores, score_designs
 from tmsopt.program.unit_box import UnitBox
 from tmsopt.records import Array
@@ -57,7 +58,7 @@ class DesignBatch:
 
     def take_first(self, most: int) -> "DesignBatch":
         """The first few."""
-        return self.take(np.arange(min(most, len(self))))
+        return self.take(np.arange(len(self))[:most])
 
     def select_apart(self, most: int, distance: float) -> "DesignBatch":
         """The first few that are at least this far apart."""
@@ -105,10 +106,6 @@ class Box:
         """The problem whose box it is."""
         return self.space.problem
 
-    def stream(self, stage: str) -> np.random.Generator:
-        """Random numbers of one stage, independent of other stages."""
-        return stream(self.seed, stage)
-
     def judge_points(self, u: Array) -> DesignBatch:
         """Judge points of shape (n, size)."""
         return _make_batch(u, score_designs(self.problem, self.space.designs(u)), self.scales, self.tuning)
@@ -134,12 +131,11 @@ class Box:
                 (designs, 1, size).
             local: designs judged around each, in each round.
         """
-        kept, rng, local, size = start, self.stream("refine"), local or self.tuning.local, self.space.size
-        count = len(kept)
-        rows = np.arange(count)
-        for reach in (reaches or self.tuning.reaches) if count else ():
-            steps = rng.standard_normal((count, local, size))
-            steps[:, ::2] *= rng.random((count, (local + 1) // 2, size)) < 0.5  # change some directions only
+        kept, rng, local, size = start, stream(self.seed, "refine"), local or self.tuning.local, self.space.size
+        rows = np.arange(len(start))
+        for reach in (reaches or self.tuning.reaches) if rows.size else ():
+            steps = rng.standard_normal((rows.size, local, size))
+            steps[:, ::2] *= rng.random(steps[:, ::2].shape) < 0.5  # change some directions only
             near = self.judge_points(np.clip(kept.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, size))
             both, of = kept.join(near), np.concatenate([rows, np.repeat(rows, local)])
             order = np.lexsort((both.objective, both.violation, of))
@@ -153,8 +149,8 @@ class Box:
             rows = np.flatnonzero((kept.violation > 0) & moving)
             if not rows.size or (step == self.tuning.hopeless_steps and kept.misses_by(self.unreachable)):
                 break
-            steps, shares = self._newton_steps(kept.u[rows]), np.array(self.tuning.shares)
-            tried = np.clip(kept.u[rows][:, None] + steps[:, None] * shares[:, None], 0.0, 1.0)
+            u, shares = kept.u[rows], np.array(self.tuning.shares)
+            tried = np.clip(u[:, None] + self._newton_steps(u)[:, None] * shares[:, None], 0.0, 1.0)
             ends = self.judge_points(tried.reshape(-1, self.space.size))
             best = np.argmin(ends.violation.reshape(len(rows), -1), axis=1) + np.arange(len(rows)) * len(shares)
             better = moving[rows] = ends.violation[best] < kept.violation[rows]
@@ -166,12 +162,12 @@ class Box:
     def explore(self, design: Mapping[str, float]) -> DesignBatch:
         """The best designs around one: at all distances, and with single parameters at either end of the box."""
         tuning, size = self.tuning, self.space.size
-        u, rng = self.space.points(design), self.stream("around")
+        u, rng = self.space.points(design), stream(self.seed, "around")
         reach = np.repeat(np.geomspace(0.5, 1e-5, tuning.shells), tuning.shell)[:, None]
         steps = rng.standard_normal((len(reach), size))
-        steps[::2] *= rng.random((len(reach[::2]), size)) < 0.5
+        steps[::2] *= rng.random(steps[::2].shape) < 0.5
         ends = np.repeat(u[None], 2 * size, axis=0)
-        ends[np.arange(len(ends)), np.repeat(np.arange(size), 2)] = np.tile([0.0, 1.0], size)
+        ends[np.arange(len(ends)), np.arange(len(ends)) // 2] = np.tile([0.0, 1.0], size)
         seen = self.judge_points(np.clip(np.concatenate([u[None], u + reach * steps, ends]), 0.0, 1.0))
         return seen.take_best(tuning.ranked).select_apart(tuning.leaders, tuning.beside)
 
@@ -188,11 +184,6 @@ class Box:
     def unreachable(self) -> float:
         """Violation that no n-fold root explains: a sample misses such a root by the n-th root of its step."""
         return self.tuning.unreachable * float(self.tuning.reaches[-1] ** (1 / max(self.problem.model.degree, 4)))
-
-    def compute_a0(self, u: Array) -> Array:
-        """The leading coefficient of designs."""
-        a0 = coefficients_of(self.problem, self.problem.ordered(self.space.designs(u)))[0]
-        return np.asarray(np.nan_to_num(np.broadcast_to(a0, len(u))))
 
     def _newton_steps(self, u: Array) -> Array:
         """Shortest steps that meet the violated limits, to first order."""
@@ -276,7 +267,8 @@ def sample_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Sample:
     bold = drawn.take(np.argsort(drawn.objective, kind="stable")[: tuning.ranked])
     known = drawn.objective[np.isfinite(drawn.objective)]
     spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
-    a0 = box.compute_a0(ranked.u)
+    lead = coefficients_of(problem, problem.ordered(box.space.designs(ranked.u)))[0]
+    a0 = np.nan_to_num(np.broadcast_to(lead, len(ranked)))
     singular = bool(a0.min() <= 0 <= a0.max() or np.abs(a0).min() < tuning.vanishing * np.median(np.abs(a0)))
     return Sample(box, refined.take(refined.order), bold.select_apart(tuning.bold, tuning.apart), spread, singular)
 
@@ -338,11 +330,8 @@ def find_basins(batch: DesignBatch, coordinates: Array, slopes: Array, tuning: T
     np.minimum.at(least, cell, rank)
     grid = least.reshape((count,) * size)
     for axis in range(size):
-        before = np.moveaxis(grid, axis, 0)
-        after = before.copy()
-        after[1:] = np.minimum(after[1:], before[:-1])
-        after[:-1] = np.minimum(after[:-1], before[1:])
-        grid = np.moveaxis(after, 0, axis)
+        ends = np.concatenate([grid.take([0], axis), grid, grid.take([-1], axis)], axis)
+        grid = sliding_window_view(ends, 3, axis).min(axis=-1)
     rows = np.flatnonzero(grid.ravel()[cell] == rank)
     rows = rows[np.argsort(rank[rows])]
     return rows, 1 / (count * slopes[rows])

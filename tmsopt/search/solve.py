@@ -4,42 +4,32 @@ import math
 import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Unpack
 
 from tmsopt.boundaries import find_edges, is_exactly_multiple
+from tmsopt.errors import Fault, InputError, is_number, short, suggest
+from tmsopt.evaluation import missed_note, prove_worst_case
+from tmsopt.evaluation.bound import minimizes_abscissa
 from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.evaluation.exclusion import bound_without_search
 from tmsopt.evaluation.recheck import Evaluation
-from tmsopt.evaluation.stored import find_storable_design, missed_note
-from tmsopt.evaluation.worst_case import prove_worst_case
+from tmsopt.evaluation.stored import find_storable_design
 from tmsopt.models.user_spectrum import beyond_axis, polynomial_structure, remove_rounding, user_structure_name
+from tmsopt.problem import Bound, Given, NotSolved, Posed, Solution, as_solvable, degrees_of_freedom, unit_at, unit_of
 from tmsopt.problem.dependence import sense_notes
-from tmsopt.problem.files import Given, as_solvable
-from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
-from tmsopt.problem.solution import Bound, Solution
-from tmsopt.problem.unit_system import unit_at, unit_of
 from tmsopt.problem.verdict.meetings import every_meeting
 from tmsopt.problem.verdict.stability import stability
-from tmsopt.problem.verdict.status import NotSolved
-from tmsopt.program.nlp import objective_size
-from tmsopt.program.options import DEFAULTS, Options, SolveOptions, documents_options, make_options
+from tmsopt.program import DEFAULTS, Options, SolveOptions, make_options, objective_size
+from tmsopt.program.options import documents_options
 from tmsopt.progress import Listener, begin, steps_for
 from tmsopt.records import Table
-from tmsopt.search.outcome import (
-    UNCLEAR,
-    Outcome,
-    assess_design,
-    is_better_outcome,
-    write_mass_advice,
-)
+from tmsopt.search.outcome import UNCLEAR, Outcome, assess_design, choose_outcome, write_mass_advice
 from tmsopt.search.policy import Policy, check_policy
 from tmsopt.search.remedies.infeasible import explain_infeasible
 from tmsopt.search.remedies.required_speed import add_required_speed
 from tmsopt.search.search import POLICY, search_part
-from tmsopt.search.state import SearchState, begin_search, check_near, same_objective
+from tmsopt.search.state import SearchState, begin_search, same_objective
 from tmsopt.search.stopping import count_starts
 
 UNSTABLE = "no stable design was found that meets the other limits"
@@ -114,28 +104,26 @@ def solve_any_status(
     if not problem.free:
         return add_cover(_assemble(problem, assess_design(problem, {}, fixed=True), (), {}, began, bound))
     if options.near:
-        check_near(problem, options.near)
+        _check_near(problem, options.near)
         near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
         options = replace(options, near=near)
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
     states = [s for s in begin_search(problem, options, tuple(extra_starts), policy.tuning) if s.side not in without]
     found = _search_sides(states, policy)
-    best = _pick_best(problem, found)
-    interrupted = any(state.interrupted for state, _ in found)
-    if interrupted:
-        if not options.interruptible:
-            raise KeyboardInterrupt
-        best = _find_best_so_far(problem, found, best)
+    best, interrupted = _pick_best(problem, found), any(state.interrupted for state, _ in found)
     try:
+        if interrupted:
+            raise KeyboardInterrupt
         outcome = best or explain_infeasible(problem, [state for state, _ in found], policy)
     except KeyboardInterrupt:
         if not options.interruptible:
             raise
-        interrupted, outcome = True, _find_best_so_far(problem, found, None)
+        interrupted, outcome = True, _find_best_so_far(problem, found, best)
     judged = sum(len(state.sample.box.draws) for state, _ in found if state.sample)
     outcome = replace(outcome, starts=replace(outcome.starts, looked=judged))
     notes = (*_describe_sides(problem, found, outcome), *sense_notes(problem))
-    solution = _assemble(problem, outcome, notes, _list_side_values(found), began, bound)
+    sides = {state.side: o.checked.objective if o and o.status == "optimal" else math.nan for state, o in found}
+    solution = _assemble(problem, outcome, notes, {n: value for n, value in sides.items() if n}, began, bound)
     solution = replace(solution, interrupted=interrupted)
     solution = solution if without_sample else add_cover(solution)
     if interrupted or not options.stability or options.near:
@@ -150,6 +138,20 @@ def solve_any_status(
             raise
         words = "the user stopped the search for a stable design"
         return replace(solution, interrupted=True, notes=(*solution.notes, words))
+
+
+def _check_near(problem: Posed, near: Mapping[str, float]) -> None:
+    """Check that a design to start near names parameters and has numbers.
+
+    Raises:
+        InputError: with all faults.
+    """
+    names = problem.parameter_set.names
+    faults = [Fault(f"unknown parameter '{n}'; {suggest(str(n), names)}", ("near",)) for n in near if n not in names]
+    wrong = (n for n, value in near.items() if not is_number(value))
+    faults += [Fault(f"found {short(near[n])}; accepted: a finite number", ("near", n)) for n in wrong]
+    if faults:
+        raise InputError(faults)
 
 
 def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[SearchedPart]:
@@ -189,26 +191,25 @@ def _find_best_so_far(problem: Posed, found: Sequence[SearchedPart], outcome: Ou
     Raises:
         KeyboardInterrupt: if there is none.
     """
+
+    def rank(outcome: Outcome) -> tuple[float, float]:
+        """By violation, then by objective."""
+        value = problem.sign * outcome.checked.objective
+        return sum(outcome.checked.violations.values()), math.inf if math.isnan(value) else value
+
     designs: list[Mapping[str, float]] = [outcome.parameters] if outcome else []
     for state, _ in found:
         designs += [state.design_at(end) for end in sorted(state.ends, key=lambda end: end.rank)[:1]]
         designs += [state.sample.box.design(state.sample.refined)] if state.sample else []
     if not designs:
         raise KeyboardInterrupt
-    best = min((assess_design(problem, design) for design in designs), key=partial(_rank, problem))
+    best = min((assess_design(problem, design) for design in designs), key=rank)
     ends = [end for state, _ in found for end in state.ends]
     many = f"{len(ends)} start{'' if len(ends) == 1 else 's'} of the solver"
     words = f"the user stopped the search after {many}; this is the best design so far"
     formulation = found[0][0].nlp.formulation if ends else "none"
     starts = count_starts(ends, problem.sign * best.checked.objective)
     return replace(best, starts=starts, formulation=formulation, notes=(words,))
-
-
-def _rank(problem: Posed, outcome: Outcome) -> tuple[float, float]:
-    """Sort key of designs, the best first: by violation, then by objective."""
-    value = problem.sign * outcome.checked.objective
-    objective = -math.inf if problem.objective is None else math.inf if math.isnan(value) else value
-    return sum(outcome.checked.violations.values()), objective
 
 
 def _add_stability(solution: Solution, options: Options, began: float, policy: Policy) -> Solution:
@@ -245,20 +246,11 @@ def _solve_near(
 
 def _pick_best(problem: Posed, found: Sequence[SearchedPart]) -> Outcome | None:
     """The best design of all parts of the box, with the starts of all parts."""
-    best: Outcome | None = None
-    for state, outcome in found:
-        if outcome is not None and (best is None or is_better_outcome(problem, outcome, best, state.tuning)):
-            best = outcome
+    best = choose_outcome(problem, [outcome for _, outcome in found], found[0][0].tuning)
     if best is None or len(found) == 1:
         return best
     starts = count_starts([end for state, _ in found for end in state.ends], math.nan)
     return replace(best, starts=replace(starts, at_best=best.starts.at_best))
-
-
-def _list_side_values(found: Sequence[SearchedPart]) -> dict[str, float]:
-    """The best objective of each part of the box; nan if it has no optimal design."""
-    named = {state.side: outcome for state, outcome in found if state.side}
-    return {n: o.checked.objective if o and o.status == "optimal" else math.nan for n, o in named.items()}
 
 
 def _describe_sides(problem: Posed, found: Sequence[SearchedPart], best: Outcome) -> tuple[str, ...]:
@@ -279,7 +271,7 @@ def _describe_sides(problem: Posed, found: Sequence[SearchedPart], best: Outcome
             return (f"both signs of the tilt were searched: {state.side} is as good as {won}",)
         else:
             which = "the best design" if outcome.status == "optimal" else "the design found"
-            unit = unit_at(problem, problem.minimize or problem.maximize or "", outcome.parameters)
+            unit = unit_at(problem, problem.goal, outcome.parameters)
             sentences.append(
                 f"{which} with {state.side} has {problem.goal} = {unit.show(outcome.checked.objective, 6)}"
             )
@@ -362,7 +354,7 @@ def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str
         return unstable
     largest = max((r.size for r in checked.structure.roots), default=0.0)
     found = stability((checked.structure.abscissa, checked.realised), edges, largest=largest)
-    if problem.free and (problem.minimize or "").strip() == "abscissa":
+    if problem.free and minimizes_abscissa(problem):
         at_edge = (
             "no design that decays was found in the box; at abscissa 0, multiple roots decide whether motions grow"
         )

@@ -1,15 +1,11 @@
 """Designs to start from: the caller's, then the sample's refined and bold ones in turn, then a sequence."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import zip_longest
 
-import numpy as np
-
-from tmsopt.program.starts import choose_starts
+from tmsopt.program import choose_starts
 from tmsopt.search.sample import Sample, sample_box
-from tmsopt.search.state import LocalEnd, SearchState, Start
-from tmsopt.search.stopping import is_proven
+from tmsopt.search.state import SearchState, Start, is_inside
 
 
 def sample_part(state: SearchState) -> Sample | None:
@@ -26,7 +22,7 @@ def propose_starts(state: SearchState) -> Iterator[Start]:
         yield Start(state.options.near)
     if part.start:
         yield Start(part.start)
-    yield from (Start(design) for design in state.extra if state.holds(design))
+    yield from (Start(design) for design in state.extra if is_inside(part, design))
     if state.sample:
         yield from propose_sample_starts(state.sample)
     yield from (Start(design, near=False) for design in choose_starts(part, state.options.seed, state.options.starts))
@@ -39,32 +35,3 @@ def propose_sample_starts(sample: Sample) -> Iterator[Start]:
         for row in pair:
             if row is not None:
                 yield Start(sample.box.design(sample.leaders, row), row < count, row)
-
-
-def is_led(state: SearchState, start: Start) -> bool:
-    """Whether the sampled design of this start leads straight down to an end, so that it would end there too."""
-    return any(start.row in end.led for end in state.ends)
-
-
-def add_led_designs(state: SearchState, end: LocalEnd) -> LocalEnd:
-    """Add to an end the sampled designs that lead straight down to it and to no earlier end."""
-    if not (state.sample and end.feasible and state.part.objective) or state.options.exhaustive:
-        return end
-    tuning, leaders, box = state.tuning, state.sample.leaders, state.sample.box
-    place = box.space.points(state.design_at(end))
-    known = (box.space.points(state.design_at(other)) for other in state.feasible)
-    if is_proven(state, end) or any(np.abs(place - other).max() <= tuning.same for other in known):
-        return end  # the search ends here, or an earlier end has the same design
-    rows = [row for row in state.left if row != end.start.row]
-    seen, near = leaders.take(np.array(rows, dtype=int)), tuning.same * (end.nlp.size + abs(end.objective))
-    if not rows:
-        return end
-    shares = np.arange(1, 8)[:, None] / 8
-    path = box.judge_points((seen.u[:, None] + shares * (place - seen.u[:, None])).reshape(-1, box.space.size))
-    objective, violation = (x.reshape(len(rows), -1) for x in (path.objective, path.violation))
-    gain = seen.objective - end.objective
-    heights = np.concatenate([seen.objective[:, None], objective], axis=1)
-    falls = np.all(heights[:, 1:] <= heights[:, :-1] + (tuning.level * np.abs(gain) + near)[:, None], axis=1)
-    down = falls & (gain >= -near) & np.isfinite(seen.objective) & (violation.max(axis=1) <= seen.violation)
-    down |= (np.abs(gain) <= near) & (seen.violation == 0)
-    return replace(end, led=frozenset(np.array(rows)[down].tolist()))

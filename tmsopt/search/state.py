@@ -7,13 +7,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.evaluation.recheck import Evaluation, recheck
-from tmsopt.problem.problem import Posed
+from tmsopt.problem import Posed
+from tmsopt.program import DEFAULTS, NLP, Options
 from tmsopt.program.formulate import design_of, formulate
 from tmsopt.program.ipopt import Point, Run
-from tmsopt.program.nlp import NLP
-from tmsopt.program.options import DEFAULTS, Options
 from tmsopt.records import Array
 from tmsopt.search.sample import Sample, sample_box
 from tmsopt.search.tuning import TUNING, Tuning
@@ -74,6 +72,11 @@ class LocalEnd:
     feasible: bool
     crossing: bool = False
     led: frozenset[int] = frozenset()
+
+    @property
+    def weight(self) -> int:
+        """How many starts the end counts for: a sampled design that leads straight to it counts as a start."""
+        return 1 + len(self.led)
 
     @property
     def rank(self) -> tuple[bool, float]:
@@ -215,9 +218,11 @@ class SearchState:
         """The free parameters at an end, clipped to the part of the box."""
         return design_of(self.part, end.run.x.tolist())
 
-    def holds(self, design: Mapping[str, float]) -> bool:
-        """Whether the given parameters of a design are in this part."""
-        return all(lower <= design.get(n, lower) <= upper for n, (lower, upper) in self.part.free.items())
+    def coefficients_at(self, end: LocalEnd) -> Array:
+        """Coefficients in every case at an end, shape (cases, n + 1)."""
+        nominal = self.part.ordered(self.design_at(end))
+        varied = [case.applied(nominal) for case in end.nlp.cases if not case.direction] or [nominal]
+        return np.array([[float(c) for c in self.part.values(p).coefficients] for p in varied])
 
     def recheck(self, design: Mapping[str, float]) -> Evaluation:
         """Recheck a design in the cases of the program."""
@@ -228,55 +233,40 @@ class SearchState:
         return replace(self, nlp=nlp, ends=(), accepted=0, best=None)
 
 
-def split_sides(problem: Posed, near: Mapping[str, float] | None = None, thin: float = TUNING.thin) -> dict[str, Posed]:
-    """Split the box at 0 of the first parameter with two named sides; return name → part, positive values first.
-
-    Args:
-        near: a design; return only the parts that contain it.
-        thin: width below which a part is not searched on its own.
-    """
-    for name, (lower, upper) in problem.free.items():
-        names = problem.parameter_set[name].sides
-        if names is not None and lower < -thin and upper > thin:
-            halves = {names[1]: (0.0, upper), names[0]: (lower, 0.0)}
-            at = (near or {}).get(name)
-            kept = {side: ends for side, ends in halves.items() if at is None or ends[0] <= at <= ends[1]}
-            return {side: _restrict_range(problem, name, ends) for side, ends in kept.items()}
-    return {"": problem}
-
-
 def begin_search(
     problem: Posed,
     options: Options = DEFAULTS,
     extra: tuple[Mapping[str, float], ...] = (),
     tuning: Tuning = TUNING,
 ) -> list[SearchState]:
-    """The initial states of a problem, one for each part of its box."""
-    parts = split_sides(problem, options.near, tuning.thin)
+    """The initial states of a problem, one for each part of its box; only parts that contain `options.near`.
+
+    The box is split at 0 of the first parameter with two named sides; positive values come first.
+    """
+    parts = {"": problem}
+    for name, (lower, upper) in problem.free.items():
+        sides = problem.parameter_set[name].sides
+        if sides is not None and lower < -tuning.thin and upper > tuning.thin:
+            parts = {}
+            for side, least, most in ((sides[1], 0.0, upper), (sides[0], lower, 0.0)):
+                start = problem.start if least <= problem.start.get(name, least) <= most else {}
+                parts[side] = problem.derive(free={**problem.free, name: (least, most)}, start=start)
+            break
     return [
         SearchState(problem, part, formulate(part, problem.cases), options, tuning, side, extra)
         for side, part in parts.items()
+        if is_inside(part, options.near or {})
     ]
 
 
-def check_near(problem: Posed, near: Mapping[str, float]) -> None:
-    """Check that a design to start near names parameters and has numbers.
-
-    Raises:
-        InputError: with all faults.
-    """
-    names = problem.parameter_set.names
-    faults = [Fault(f"unknown parameter '{n}'; {suggest(str(n), names)}", ("near",)) for n in near if n not in names]
-    wrong = (n for n, value in near.items() if not is_number(value))
-    faults += [Fault(f"found {short(near[n])}; accepted: a finite number", ("near", n)) for n in wrong]
-    if faults:
-        raise InputError(faults)
+def is_inside(problem: Posed, design: Mapping[str, float]) -> bool:
+    """Whether the given parameters of a design are in the box."""
+    return all(lower <= design.get(n, lower) <= upper for n, (lower, upper) in problem.free.items())
 
 
-def _restrict_range(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
-    """The problem with a smaller range of one parameter, and with its start if that fits."""
-    inside = all(ends[0] <= v <= ends[1] for n, v in problem.start.items() if n == name)
-    return problem.derive(free={**problem.free, name: ends}, start=problem.start if inside else {})
+def is_close(problem: Posed, one: Mapping[str, float], other: Mapping[str, float], share: float) -> bool:
+    """Whether no free parameter differs by more than a share of its range."""
+    return all(abs(one[n] - other[n]) <= share * (upper - lower) for n, (lower, upper) in problem.free.items())
 
 
 def clip_to_box(problem: Posed, design: Mapping[str, float]) -> dict[str, float]:
@@ -287,13 +277,6 @@ def clip_to_box(problem: Posed, design: Mapping[str, float]) -> dict[str, float]
 def same_objective(a: float, b: float, size: float = 1.0, same: float = TUNING.same) -> bool:
     """Whether two objectives count as the same optimum; `size` is the least scale of the comparison."""
     return abs(a - b) <= same * (size + abs(b))
-
-
-def coefficients_at(problem: Posed, nlp: NLP, run: Run) -> Array:
-    """Coefficients in every case at the end of a run, shape (cases, n + 1)."""
-    nominal = problem.ordered(design_of(problem, run.x.tolist()))
-    varied = [c.applied(nominal) for c in nlp.cases if not c.direction] or [nominal]
-    return np.array([[float(c) for c in problem.model.coefficients(p, problem.parameter_set)] for p in varied])
 
 
 @lru_cache(maxsize=8)

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from tmsopt.evaluation.bound import instant_bound, is_gap_closed, minimizes_abscissa
-from tmsopt.problem.freedom import degrees_of_freedom
-from tmsopt.problem.searches import Starts
-from tmsopt.search.state import LocalEnd, SearchState, coefficients_at, same_objective
+from tmsopt.problem import Starts, degrees_of_freedom
+from tmsopt.search.state import LocalEnd, SearchState, same_objective
 from tmsopt.search.tuning import TUNING
 
 
@@ -49,7 +48,7 @@ def is_proven(state: SearchState, end: LocalEnd) -> bool:
     problem = state.part
     if not (end.feasible and minimizes_abscissa(problem)):
         return False
-    a = coefficients_at(problem, end.nlp, end.run)[0]
+    a = state.coefficients_at(end)[0]
     own = -(abs(a[-1] / a[0]) ** (1 / problem.model.degree)) if a[0] else -math.inf
     near = is_gap_closed(end.objective - own, own, end.nlp.size)
     return near and instant_bound(problem, end.objective).proven
@@ -57,14 +56,13 @@ def is_proven(state: SearchState, end: LocalEnd) -> bool:
 
 def count_starts(ends: Sequence[LocalEnd], best: float, same: float = TUNING.same) -> Starts:
     """Count starts by how they ended; a sampled design that leads straight to an end counts as a start."""
-    weights = [(end, 1 + len(end.led)) for end in ends]
-    feasible = [(end, weight) for end, weight in weights if end.feasible]
-    objectives = sorted(end.objective for end, _ in feasible)
+    feasible = [end for end in ends if end.feasible]
+    objectives = sorted(end.objective for end in feasible)
     size = ends[0].nlp.size if ends else 1.0
     return Starts(
-        tried=sum(weight for _, weight in weights),
-        converged=sum(weight for _, weight in feasible),
-        at_best=sum(weight for end, weight in feasible if same_objective(end.objective, best, end.nlp.size, same)),
+        tried=sum(end.weight for end in ends),
+        converged=sum(end.weight for end in feasible),
+        at_best=sum(end.weight for end in feasible if same_objective(end.objective, best, end.nlp.size, same)),
         optima=bool(objectives) + sum(not same_objective(a, b, size, same) for a, b in pairwise(objectives)),
         runs=len(ends),
     )

@@ -1,15 +1,16 @@
-"""A problem with changed limits, solved again."""
+"""A problem with changed limits, solved again within the time that advice may take."""
 
+import time
 from collections.abc import Mapping
 from dataclasses import replace
 
 from tmsopt.evaluation.bound import minimizes_abscissa
 from tmsopt.evaluation.recheck import recheck
+from tmsopt.problem import Posed, Starts
 from tmsopt.problem.dependence import stability_limit
-from tmsopt.problem.problem import Posed
-from tmsopt.problem.searches import Starts
-from tmsopt.program.options import Options
-from tmsopt.search.outcome import Outcome, assess_best, has_runaway_root, is_better_outcome
+from tmsopt.program import Options
+from tmsopt.progress import Progress, Steps
+from tmsopt.search.outcome import Outcome, assess_best, choose_outcome, has_runaway_root
 from tmsopt.search.policy import run_nested
 from tmsopt.search.search import POLICY, search_nested
 from tmsopt.search.state import SearchState, begin_search
@@ -17,6 +18,25 @@ from tmsopt.search.stopping import count_starts
 
 _FEW_STARTS = 6  # of a problem with changed limits
 _LEAST_DECAY = 1e-6  # of the roots' mean size: a design that decays this fast counts as stable
+_SECONDS = 2.5  # least allowance, of process time: enough to solve a problem with seven free parameters again
+_SHARE = 0.3  # allowance as a share of the time spent before
+
+
+class OutOfTime(Exception):
+    """Raised when the allowance is used up."""
+
+
+def limit_time(options: Options, spent: float = 0.0) -> Options:
+    """A copy of the options with which work raises `OutOfTime` once its allowance is used up."""
+    end = time.process_time() + max(_SECONDS, _SHARE * spent)
+
+    def check_time(_: Progress) -> None:
+        if time.process_time() > end:
+            raise OutOfTime
+
+    steps = Steps(check_time)
+    steps.begin("solving again", "start")
+    return replace(options, progress=steps, near=None)
 
 
 def solve_again(
@@ -27,23 +47,15 @@ def solve_again(
     A few starts suffice if they end at a stable design. They also suffice if all end at one least abscissa that is not
     stable, unless `thorough`. Otherwise the whole search runs.
     """
-    stable = _require_stability(problem, original)
-    best: Outcome | None = None
-    for state in begin_search(problem, options):
-        outcome = None if problem.cases else _search_few_starts(state, stable, thorough)
-        outcome = outcome or search_nested(state)
-        best = (
-            outcome if outcome and (best is None or is_better_outcome(problem, outcome, best, state.tuning)) else best
-        )
+    limits = {**problem.constraints, **stability_limit(original, _LEAST_DECAY)}
+    stable = problem.derive(constraints=limits, minimize=None, maximize=None)
+    states = begin_search(problem, options)
+    few = [None if problem.cases else _search_few_starts(state, stable, thorough) for state in states]
+    outcomes = [outcome or search_nested(state) for state, outcome in zip(states, few, strict=True)]
+    best = choose_outcome(problem, outcomes, states[0].tuning)
     if best is None or best.status != "optimal":
         return None
     return best.parameters if _is_met(stable, best) else {}
-
-
-def _require_stability(problem: Posed, original: Posed) -> Posed:
-    """The limits of a problem, and stability if the original problem needs it."""
-    limits = {**problem.constraints, **stability_limit(original, _LEAST_DECAY)}
-    return problem.derive(constraints=limits, minimize=None, maximize=None)
 
 
 def _search_few_starts(state: SearchState, stable: Posed, thorough: bool) -> Outcome | None:
@@ -51,9 +63,11 @@ def _search_few_starts(state: SearchState, stable: Posed, thorough: bool) -> Out
     state = replace(state, sample=POLICY.sample(state))
     state = run_nested(state, POLICY.starts(state), POLICY, _FEW_STARTS)
     outcome = assess_best(state, Starts())
-    if outcome is None or outcome.status != "optimal":
-        return None
-    if has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway):
+    if (
+        outcome is None
+        or outcome.status != "optimal"
+        or has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway)
+    ):
         return None
     agreed = all(end.feasible for end in state.ends) and count_starts(state.ends, 0.0).optima == 1
     settled = agreed and not thorough and minimizes_abscissa(state.part)

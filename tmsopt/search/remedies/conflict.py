@@ -3,15 +3,14 @@
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from tmsopt.evaluation import find_worst_cases
 from tmsopt.evaluation.recheck import recheck
-from tmsopt.evaluation.worst_case import find_worst_cases
-from tmsopt.problem.advice.remedies import Relaxation
-from tmsopt.problem.problem import Posed
+from tmsopt.problem import Posed, Relaxation
 from tmsopt.problem.quantities import RADIUS
-from tmsopt.program.options import Options
+from tmsopt.program import Options
 from tmsopt.search.policy import run_nested
 from tmsopt.search.search import POLICY, search_nested
-from tmsopt.search.state import CheckedEnd, SearchState, begin_search
+from tmsopt.search.state import CheckedEnd, SearchState, begin_search, is_inside
 
 STARTS = 6
 """Starts of a short search."""
@@ -45,11 +44,11 @@ def find_conflict(
     """
     if not relaxation.amounts:
         return relaxation
-    check = _FeasibilityCheck(problem, replace(options, starts=STARTS, progress=None))
+    check = _ConflictSearch(problem, likely, wide, replace(options, starts=STARTS, progress=None))
     designs: list[Mapping[str, float]] = [relaxation.parameters]
     for _ in range(_MOST_CONFLICTS):
         check.designs = designs
-        kept, sure = _reduce_constraints(check, likely)
+        kept, sure = check.reduce_constraints()
         design, certain = search(kept) if len(kept) < len(problem.constraints) else (None, True)
         if design is None:
             sure = sure and certain
@@ -57,13 +56,12 @@ def find_conflict(
         designs = [*designs, design]
     else:
         kept, sure = tuple(problem.constraints), False
-    ends_moved = _find_blocking_ends(check, kept, likely, wide)
-    names = (*kept, *ends_moved)
+    names = (*kept, *check.find_blocking_ends(kept))
     return replace(relaxation, conflict=names or tuple(likely), irreducible=sure and bool(names))
 
 
 @dataclass
-class _FeasibilityCheck:
+class _ConflictSearch:
     """Which limits of a problem can be met together, by known designs and by a few starts.
 
     Attributes:
@@ -72,58 +70,47 @@ class _FeasibilityCheck:
     """
 
     problem: Posed
+    likely: Sequence[str]
+    wide: Posed
     options: Options
     designs: Sequence[Mapping[str, float]] = ()
     results: dict[Hashable, bool | None] = field(default_factory=dict)
 
-    def can_meet(self, names: Sequence[str], ends: Mapping[str, tuple[float, float]]) -> bool | None:
-        """Whether a design meets the constraints of these names, with these other ranges; None if unknown."""
-        free = self.problem.free
+    def can_meet(self, names: Sequence[str], moved: Sequence[str] = ()) -> bool | None:
+        """Whether a design meets the constraints of these names in the box, with these ends moved; None if unknown."""
+        ranges = dict(self.problem.free)
+        for name, _, end in (n.rpartition(".") for n in moved):
+            (lower, upper), (least, most) = ranges[name], self.wide.free[name]
+            ranges[name] = (least, upper) if end == "min" else (lower, most)
         rest = {n: text for n, text in self.problem.constraints.items() if n in names}
-        part = self.problem.derive(constraints=rest, free={**free, **ends})
-        if any(_is_inside(part, d) and _is_feasible(part, part.ordered(d)) for d in self.designs):
+        part = self.problem.derive(constraints=rest, free=ranges)
+        if any(is_inside(part, d) and _is_feasible(part, part.ordered(d)) for d in self.designs):
             return True
-        key = (tuple(rest), tuple(ends.items()))
+        key = (tuple(rest), tuple(ranges.items()))
         if key not in self.results and len(self.results) < _MOST_SEARCHES:
-            self.results[key] = _can_be_met(part, self.designs, self.options, quick=bool(ends))
+            self.results[key] = _can_be_met(part, self.designs, self.options, quick=bool(moved))
         return self.results.get(key)
 
+    def reduce_constraints(self) -> tuple[tuple[str, ...], bool]:
+        """Constraints that seem to exclude each other, none of them superfluous, and whether this is certain."""
+        kept, sure = tuple(self.problem.constraints), True
+        others = [n for n in kept if n not in self.likely]
+        in_order = sorted((n for n in kept if n in self.likely), key=lambda n: n not in self.problem.asked_of_roots)
+        for group in (others, *([n] for n in others if len(others) > 1), *([n] for n in in_order)):
+            if group and set(group) <= set(kept):
+                met = self.can_meet(rest := tuple(n for n in kept if n not in group))
+                kept, sure = rest if met is False else kept, sure and (met is not None or len(group) > 1)
+        return kept, sure
 
-def _reduce_constraints(check: _FeasibilityCheck, likely: Sequence[str]) -> tuple[tuple[str, ...], bool]:
-    """Constraints that seem to exclude each other, none of them superfluous, and whether this is certain."""
-    problem = check.problem
-    kept, sure = tuple(problem.constraints), True
-    others = [n for n in kept if n not in likely]
-    in_order = sorted((n for n in kept if n in likely), key=lambda n: n not in problem.asked_of_roots)
-    groups = [others, *([n] for n in others if len(others) > 1), *([n] for n in in_order)]
-    for group in groups:
-        if group and set(group) <= set(kept):
-            met = check.can_meet(rest := tuple(n for n in kept if n not in group), {})
-            kept, sure = rest if met is False else kept, sure and (met is not None or len(group) > 1)
-    return kept, sure
-
-
-def _find_blocking_ends(check: _FeasibilityCheck, kept: Sequence[str], likely: Sequence[str], wide: Posed) -> list[str]:
-    """Ends of ranges: moving one of them lets a design meet the constraints."""
-    problem = check.problem
-    named = [n for n in problem.free if any(n in problem.conditions[k].names for k in kept)]
-    possible = [
-        *(n for n in likely if n not in problem.constraints),
-        *(f"{n}.{e}" for n in named for e in ("min", "max")),
-    ]
-    names = list(dict.fromkeys(possible))
-    if len(names) > 1 and check.can_meet(kept, _widen_ends(problem, wide, names)) is False:
-        return []
-    return [name for name in names if check.can_meet(kept, _widen_ends(problem, wide, [name]))]
-
-
-def _widen_ends(problem: Posed, wide: Posed, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """The ranges in which these ends are moved as far out as they may be."""
-    ranges = dict(problem.free)
-    for name, end in (n.rsplit(".", 1) for n in names):
-        lower, upper = ranges[name]
-        ranges[name] = (wide.free[name][0], upper) if end == "min" else (lower, wide.free[name][1])
-    return {n: ends for n, ends in ranges.items() if ends != problem.free[n]}
+    def find_blocking_ends(self, kept: Sequence[str]) -> list[str]:
+        """Ends of ranges: moving one of them lets a design meet the constraints."""
+        problem = self.problem
+        named = [n for n in problem.free if any(n in problem.conditions[k].names for k in kept)]
+        possible = [n for n in self.likely if n not in problem.constraints]
+        names = list(dict.fromkeys([*possible, *(f"{n}.{end}" for n in named for end in ("min", "max"))]))
+        if len(names) > 1 and self.can_meet(kept, names) is False:
+            return []
+        return [name for name in names if self.can_meet(kept, [name])]
 
 
 def _can_be_met(problem: Posed, known: Sequence[Mapping[str, float]], options: Options, quick: bool) -> bool | None:
@@ -137,7 +124,7 @@ def _can_be_met(problem: Posed, known: Sequence[Mapping[str, float]], options: O
     samples = [state.sample for state in states if state.sample]
     if any(_is_feasible(problem, problem.ordered(sample.box.design(sample.refined))) for sample in samples):
         return True
-    if quick and len(samples) == len(states) and all(sample.far_off for sample in samples):
+    if quick and samples and all(sample.far_off for sample in samples):
         return False
     ends = [t for t in map(search_briefly, states) if t and not t.checked.violations]
     return any(_is_feasible(problem, t.parameters) for t in ends) or (None if ends else False)
@@ -149,11 +136,6 @@ def search_briefly(state: SearchState) -> CheckedEnd | None:
     if state.out_of_reach:
         return None
     return run_nested(state, POLICY.starts(state), POLICY, STARTS).best
-
-
-def _is_inside(problem: Posed, design: Mapping[str, float]) -> bool:
-    """Whether a design is in the box."""
-    return all(lower <= design[n] <= upper for n, (lower, upper) in problem.free.items())
 
 
 def _is_feasible(problem: Posed, design: Mapping[str, float]) -> bool:

@@ -2,26 +2,23 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import fold, formula, symbol
-from tmsopt.algebra.kinds import NODES, atan
+from tmsopt.algebra import NODES, fold
+from tmsopt.algebra.formula import formula, symbol
+from tmsopt.algebra.kinds import atan
+from tmsopt.evaluation import find_worst_cases
 from tmsopt.evaluation.recheck import FEASIBLE, measure_excesses, recheck
-from tmsopt.evaluation.worst_case import find_worst_cases
 from tmsopt.models import Values
-from tmsopt.problem.advice.remedies import Relaxation
-from tmsopt.problem.cases import Case
-from tmsopt.problem.problem import Posed
+from tmsopt.problem import Case, Posed, Relaxation
+from tmsopt.program import NLP, Options
 from tmsopt.program.formulate import formulate
-from tmsopt.program.nlp import NLP, AddedVariable, variable_name
-from tmsopt.program.options import Options
+from tmsopt.program.nlp import AddedVariable, variable_name
 from tmsopt.records import Table
 from tmsopt.search.policy import disable_stopping, run_nested
-from tmsopt.search.sample import Box, draw_box
+from tmsopt.search.sample import Box, Sample, draw_box
 from tmsopt.search.search import POLICY
 from tmsopt.search.state import CheckedEnd, SearchState, Start, begin_search, clip_to_box, same_objective
 
@@ -45,79 +42,189 @@ class Limit:
     Attributes:
         scale: the amount that counts as 1 in sums.
         parameter, end: for an end of a range, its parameter and value.
+        upper: whether this is the upper end.
     """
 
     name: str
     scale: float
     parameter: str = ""
     end: float = 0.0
-
-    def measure_need(self, parameters: Mapping[str, float], excess: Mapping[str, float]) -> float:
-        """The amount by which a design needs the limit moved."""
-        if not self.parameter:
-            return excess.get(self.name, 0.0)
-        beyond = parameters[self.parameter] - self.end
-        return max(beyond if self.name.endswith(".max") else -beyond, 0.0)
+    upper: bool = False
 
 
-def find_least_relaxation(
-    problem: Posed,
-    options: Options,
-    wide: Posed,
-    limits: Sequence[Limit],
-    designs: Sequence[Mapping[str, float]] = (),
-) -> tuple[Relaxation, CheckedEnd | None, NLP | None] | tuple[None, None, None]:
-    """The least relaxation in a box, with its end and program; without these for a known design."""
-    sides = begin_search(wide, options)
-    results = [_find_least_in_cases(side, limits, problem.cases) for side in sides]
-    feasible = [(trial, nlp) for trial, nlp in results if trial is not None]
-    trial, nlp = min(feasible, key=lambda found: found[0].point.objective, default=(None, None))
-    candidates: list[tuple[float, Relaxation]] = []
-    for side in sides if not problem.cases else ():
-        candidates += islice(_list_known_relaxations(side, limits, designs), 1)
-    least, known = min(candidates, key=lambda found: found[0], default=(np.inf, None))
-    amounts = _compute_amounts(wide, limits, trial.parameters, nlp.cases) if trial and nlp else {}
-    if known and (trial is None or least < sum_amounts(limits, amounts) * (1 - _TIE)):
-        return known, None, None
-    if trial is None or nlp is None:
-        return None, None, None
-    return Relaxation(Table(trial.parameters), Table(amounts)), trial, nlp
+@dataclass(frozen=True)
+class ElasticProblem:
+    """A problem of which some limits may move: the sum of the amounts, each in units of its scale, is minimised.
+
+    Attributes:
+        problem: in the box that is searched.
+        limits: those that may move; all others stay.
+        sample: of the box, to start from.
+    """
+
+    problem: Posed
+    limits: Sequence[Limit]
+    options: Options
+    sample: Sample | None = None
+
+    def find_least(
+        self, designs: Sequence[Mapping[str, float]] = ()
+    ) -> tuple[Relaxation, CheckedEnd | None] | tuple[None, None]:
+        """The least relaxation, with its end, or without one for a known design; (None, None) if there is none."""
+        states = begin_search(self.problem, self.options)
+        sides = [replace(self, problem=state.part, sample=POLICY.sample(state)) for state in states]
+        ends = [end for side in sides if (end := side._find_least_in_cases())]
+        trial = min(ends, key=lambda end: end.point.objective, default=None)
+        known = [] if self.problem.cases else [found for side in sides if (found := side._find_known(designs))]
+        least, relaxation = min(known, key=lambda found: found[0], default=(np.inf, None))
+        amounts = self._compute_amounts(trial.parameters, trial.end.nlp.cases) if trial else {}
+        if relaxation and (trial is None or least < self.sum_amounts(amounts) * (1 - _TIE)):
+            return relaxation, None
+        return (Relaxation(Table(trial.parameters), Table(amounts)), trial) if trial else (None, None)
+
+    def find_amounts(
+        self, designs: Sequence[Mapping[str, float]], cases: Sequence[Case] | None = None
+    ) -> dict[str, float]:
+        """Amounts of the least relaxation that these designs lead to; {} if they lead to none."""
+        nlp = self._build_program(self.problem.cases if cases is None else cases)
+        trial = self._solve(nlp, designs)
+        return self._compute_amounts(trial.parameters, nlp.cases) if trial else {}
+
+    def sum_amounts(self, amounts: Mapping[str, float]) -> float:
+        """Sum of the amounts, each in units of its limit."""
+        return sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in self.limits)
+
+    def list_holding(self, trial: CheckedEnd) -> list[str]:
+        """Limits with a multiplier: without one of them, less would suffice."""
+        scales, nlp = {limit.name: limit.scale for limit in self.limits}, trial.end.nlp
+        rows = zip(nlp.rows, trial.point.row_multipliers.tolist(), strict=True)
+        names = [row for row, multiplier in rows if row in scales and abs(multiplier) * scales[row] > _ACTIVE]
+        bounds = zip(nlp.variables, trial.point.bound_multipliers.tolist(), nlp.lower, nlp.upper, strict=True)
+        for variable, multiplier, lower, upper in bounds:
+            parameter = variable.removeprefix("tan(").removesuffix(")")
+            if parameter in trial.parameters and abs(multiplier) * (upper - lower) > _ACTIVE:
+                names.append(f"{parameter}.{'max' if multiplier > 0 else 'min'}")
+        return names
+
+    def _find_least_in_cases(self) -> CheckedEnd | None:
+        """The least relaxation of one part of the box, with cases added until none between them needs more."""
+        cases = self.problem.cases
+        trial = self._solve(self._build_program(cases))
+        movable = [limit for limit in self.limits if not limit.parameter]
+        if trial and self.options.starts >= _MOST_STARTS and trial.point.objective > _NOTHING and len(movable) > 1:
+            box = draw_box(self.problem.derive(locate=None), self.options.seed)
+            leads = {tuple(d.values()): d for limit in movable for d in _propose_leads(box, limit.name)}
+            again = self._solve(trial.end.nlp, list(leads.values()))
+            if again and again.point.objective < trial.point.objective * (1 - _TIE):
+                trial = again
+        for _ in range(_ROUNDS if cases else 0):
+            if trial is None or not (more := self._find_worse_cases(trial)):
+                break
+            nlp = self._build_program((*trial.end.nlp.cases, *more))
+            trial = self._solve(nlp, [trial.parameters]) or self._solve(nlp)
+        return trial
+
+    def _solve(self, nlp: NLP, designs: Sequence[Mapping[str, float]] | None = None) -> CheckedEnd | None:
+        """The least relaxation from these designs, or from a few starts; None if a fixed limit is violated."""
+        state = SearchState(self._drop_limits(), self.problem, nlp, self.options)
+        if designs is None:
+            state = replace(state, sample=self.sample)
+            state = run_nested(state, POLICY.starts(state), _RELAXING, min(_MOST_STARTS, self.options.starts))
+        else:
+            state = run_nested(state, map(Start, designs), disable_stopping(_RELAXING))
+        return state.best if state.best is not None and not state.best.checked.violations else None
+
+    def _find_known(self, designs: Sequence[Mapping[str, float]]) -> tuple[float, Relaxation] | None:
+        """The least relaxation, and its sum, for known designs and the best sampled design."""
+        known, unlimited, sample = list(designs), self._drop_limits(), self.sample
+        if sample:
+            known += sample.box.designs(sample.box.refine(sample.refined.take_first(1), _FINEST))
+        needs = [(p, self._compute_amounts(p, ())) for p in map(self.problem.ordered, known)]
+        for parameters, amounts in sorted(needs, key=lambda need: self.sum_amounts(need[1])):
+            if not recheck(unlimited, parameters).violations:
+                return self.sum_amounts(amounts), Relaxation(Table(parameters), Table(amounts))
+        return None
+
+    def _drop_limits(self) -> Posed:
+        """The problem without an objective and the constraints that may move."""
+        moved = {limit.name for limit in self.limits}
+        kept = {n: c for n, c in self.problem.constraints.items() if n not in moved}
+        return self.problem.derive(constraints=kept, minimize=None, maximize=None)
+
+    def _find_worse_cases(self, trial: CheckedEnd) -> list[Case]:
+        """Cases between the listed ones in which a design needs more."""
+        cases = trial.end.nlp.cases
+        worst = [w.case for w in find_worst_cases(self.problem, trial.parameters).values()]
+        known, needed = (self._compute_amounts(trial.parameters, c) for c in (cases, (*cases, *worst)))
+        grown = any(abs(a) > abs(known.get(n, 0.0)) + FEASIBLE * (1 + abs(a)) for n, a in needed.items())
+        return [case for case in worst if case not in cases] if grown else []
+
+    def _compute_amounts(self, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:
+        """The amounts that a design needs, by its own recheck."""
+        needed = measure_excesses(self.problem, parameters, cases)
+        for limit in self.limits:
+            if limit.parameter:
+                beyond = parameters[limit.parameter] - limit.end
+                needed[limit.name] = max(beyond if limit.upper else -beyond, 0.0)
+        amounts = {limit: needed.get(limit.name, 0.0) for limit in self.limits}
+        return {n.name: a * (1 + _ROUND_UP) for n, a in amounts.items() if abs(a) > FEASIBLE * n.scale}
+
+    def _build_program(self, cases: Sequence[Case]) -> NLP:
+        """Minimise Σ slack/scale with each limit moved by its slack, all others kept."""
+        nlp = formulate(self.problem, cases, elastic=True)
+        names = [limit.name for limit in self.limits]
+        new = [variable_name(len(nlp.variables) + k) for k in range(len(names))]
+        slacks = dict(zip(names, map(symbol, new), strict=True))
+        _, *g = fold(nlp.formula, {n: symbol(n) for n in nlp.formula.names}, NODES)
+        rows: list[tuple[str, Any, float, float]] = []
+        second: list[tuple[str, Any, float, float]] = []  # last, because touches and kinks refer to rows by number
+        for name, value, lower, upper in zip(nlp.rows, g, nlp.row_lower, nlp.row_upper, strict=True):
+            if name not in slacks:
+                rows.append((name, value, lower, upper))
+                continue
+            moved = [(name, value - slacks[name], -np.inf, upper), (name, value + slacks[name], lower, np.inf)]
+            first, *others = [row for row in moved if np.any(np.isfinite(row[2:]))]
+            rows.append(first)
+            second += others
+        rows += second
+        for limit in self.limits:
+            if limit.parameter:
+                value = symbol(nlp.inputs[list(self.problem.free).index(limit.parameter)])
+                if self.problem.parameter_set[limit.parameter].tangent:
+                    value = atan(value)
+                slack, ends = slacks[limit.name], (-np.inf, limit.end) if limit.upper else (limit.end, np.inf)
+                rows.append((limit.name, value - slack if limit.upper else value + slack, *ends))
+        objective = sum(slacks[limit.name] / limit.scale for limit in self.limits)
+        row_names, values, row_lower, row_upper = zip(*rows, strict=True)
+        return replace(
+            nlp,
+            formulation="elastic",
+            variables=(*nlp.variables, *(f"slack of {n}" for n in names)),
+            formula=formula([objective, *values], (*nlp.inputs, *new, *nlp.numbers)),
+            lower=(*nlp.lower, *[0.0] * len(names)),
+            upper=(*nlp.upper, *[np.inf] * len(names)),
+            rows=row_names,
+            row_lower=row_lower,
+            row_upper=row_upper,
+            lifts=(*nlp.lifts, AddedVariable("slack", len(names), self._guess_slacks)),
+        )
+
+    def _guess_slacks(self, values: Sequence[Values], z: Any) -> list[list[float]]:
+        """Initial slacks: what a design needs, and a little more."""
+        found = []
+        for limit in self.limits:
+            condition = self.problem.conditions.get(limit.name)
+            differences = [abs(float(condition(v))) for v in values] if condition else [0.0]
+            found.append(max(filter(np.isfinite, differences), default=1.0) + 1e-3)
+        return [found]
 
 
-def find_relaxation_near(
-    options: Options, box: Posed, limits: Sequence[Limit], design: Mapping[str, float]
-) -> dict[str, float]:
-    """Amounts of the least relaxation that this design leads to; {} if it leads to none."""
-    trial = _solve_relaxation(box, options, _build_elastic_program(box, box.cases, limits), limits, [design])
-    return _compute_amounts(box, limits, trial.parameters, trial.end.nlp.cases) if trial else {}
-
-
-def _list_known_relaxations(
-    side: SearchState, limits: Sequence[Limit], designs: Sequence[Mapping[str, float]]
-) -> Iterator[tuple[float, Relaxation]]:
-    """Relaxations for known designs and the best sampled design, the least first."""
-    known, unlimited = list(designs), _drop_limits(side.problem, limits)
-    if sample := POLICY.sample(side):
-        known += [*sample.box.designs(sample.box.refine(sample.refined.take_first(1), _FINEST))]
-    needs = [(p, _compute_amounts(side.problem, limits, p, ())) for p in map(side.problem.ordered, known)]
-    totals = [sum_amounts(limits, amounts) for _, amounts in needs]
-    for row in np.argsort(totals, kind="stable").tolist():
-        parameters, amounts = needs[row]
-        if not recheck(unlimited, parameters).violations:
-            yield totals[row], Relaxation(Table(parameters), Table(amounts))
-
-
-def sum_amounts(limits: Sequence[Limit], amounts: Mapping[str, float]) -> float:
-    """Sum of the amounts, each in units of its limit."""
-    return sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in limits)
-
-
-def list_stages(problem: Posed) -> Iterator[tuple[Posed, list[Limit]]]:
+def list_stages(problem: Posed, options: Options) -> Iterator[ElasticProblem]:
     """The problem with the limits to move: first the constraints in its own box, then also the box."""
     constraints = _make_constraint_limits(problem)
     if constraints:
-        yield problem, constraints
-    yield widen_box(problem, problem.free), [*constraints, *_make_bound_limits(problem)]
+        yield ElasticProblem(problem, constraints, options)
+    yield ElasticProblem(widen_box(problem, problem.free), [*constraints, *_make_bound_limits(problem)], options)
 
 
 def _make_constraint_limits(problem: Posed) -> list[Limit]:
@@ -136,9 +243,9 @@ def _make_constraint_limits(problem: Posed) -> list[Limit]:
 
 def _make_bound_limits(problem: Posed) -> list[Limit]:
     return [
-        Limit(f"{name}.{end}", ends[1] - ends[0], name, ends[k])
+        Limit(f"{name}.{'max' if upper else 'min'}", ends[1] - ends[0], name, ends[upper], upper)
         for name, ends in problem.free.items()
-        for k, end in enumerate(("min", "max"))
+        for upper in (False, True)
     ]
 
 
@@ -154,50 +261,23 @@ def widen_box(problem: Posed, names: Collection[str]) -> Posed:
     return problem.derive(free=free)
 
 
-def _find_least_in_cases(
-    side: SearchState, limits: Sequence[Limit], listed: Sequence[Case]
-) -> tuple[CheckedEnd | None, NLP]:
-    """The least relaxation of one part of the box, with cases added until none between them needs more."""
-    trial, nlp = _find_least(side, limits, listed)
-    movable = [limit for limit in limits if not limit.parameter]
-    thorough = side.options.starts >= _MOST_STARTS
-    if thorough and trial is not None and trial.point.objective > _NOTHING and len(movable) > 1:
-        box = _draw_limit_box(side.part, side.options)
-        leads = {tuple(d.values()): d for limit in movable for d in _propose_leads(box, limit.name)}
-        again = _solve_relaxation(side.part, side.options, nlp, limits, list(leads.values()))
-        if again is not None and again.point.objective < trial.point.objective * (1 - _TIE):
-            trial = again
-    for _ in range(_ROUNDS if listed else 0):
-        if trial is None or not (more := _find_worse_cases(side.problem, limits, trial, nlp.cases)):
-            break
-        trial, nlp = _find_least(side, limits, (*nlp.cases, *more), trial)
-    return trial, nlp
+def relax_each_alone(problem: Posed, options: Options, conflict: Sequence[str], trial: CheckedEnd) -> dict[str, float]:
+    """How far each limit of a conflict must move if no other does; limits that cannot help alone are left out."""
+    limits = {limit.name: limit for limit in (*_make_constraint_limits(problem), *_make_bound_limits(problem))}
+    found: dict[str, float] = {}
+    for limit in (limits[name] for name in conflict):
+        wide = widen_box(problem, [limit.parameter] if limit.parameter else [])
+        goal = {"minimize" if limit.upper else "maximize": limit.parameter} if limit.parameter else {}
+        if leads := _propose_leads(draw_box(wide.derive(locate=None, **goal), options.seed), limit.name):
+            designs = [clip_to_box(wide, trial.parameters), *leads]
+            found |= ElasticProblem(wide, [limit], options).find_amounts(designs, trial.end.nlp.cases)
+    return found
 
 
-def _find_least(
-    side: SearchState, limits: Sequence[Limit], cases: Sequence[Case], before: CheckedEnd | None = None
-) -> tuple[CheckedEnd | None, NLP]:
-    """The least relaxation that the end `before` leads to, or else a few starts."""
-    nlp = _build_elastic_program(side.part, cases, limits)
-    trial = _solve_relaxation(side.part, side.options, nlp, limits, [before.parameters]) if before else None
-    return trial or _solve_relaxation(side.part, side.options, nlp, limits), nlp
-
-
-def _solve_relaxation(
-    problem: Posed,
-    options: Options,
-    nlp: NLP,
-    limits: Sequence[Limit],
-    designs: Sequence[Mapping[str, float]] | None = None,
-) -> CheckedEnd | None:
-    """The least relaxation from these designs, or from a few starts; None if a fixed limit is violated."""
-    state = SearchState(_drop_limits(problem, limits), problem, nlp, options)
-    if designs is None:
-        state = replace(state, sample=POLICY.sample(state))
-        state = run_nested(state, POLICY.starts(state), _RELAXING, min(_MOST_STARTS, options.starts))
-    else:
-        state = run_nested(state, map(Start, designs), disable_stopping(_RELAXING))
-    return state.best if state.best is not None and not state.best.checked.violations else None
+def _propose_leads(box: Box, name: str) -> list[dict[str, float]]:
+    """Designs that may need only this limit moved; none if the other limits exclude each other."""
+    found = box.ignore_limit(name)
+    return [] if found.misses_by(box.tuning.far_off) else [*box.designs(found.take_first(_LEADS))]
 
 
 def _is_least(state: SearchState) -> bool:
@@ -209,127 +289,3 @@ def _is_least(state: SearchState) -> bool:
 
 
 _RELAXING = replace(POLICY, enough=_is_least)
-
-
-def _draw_limit_box(problem: Posed, options: Options, extended: Limit | None = None) -> Box:
-    """A sample of the box for the limits alone, with a moved end of the box as the objective, if any."""
-    goal = {}
-    if extended and extended.parameter:
-        goal = {"minimize" if extended.name.endswith(".max") else "maximize": extended.parameter}
-    return draw_box(problem.derive(locate=None, **goal), options.seed)
-
-
-def _propose_leads(box: Box, name: str) -> list[dict[str, float]]:
-    """Designs that may need only this limit moved; none if the other limits exclude each other."""
-    found = box.ignore_limit(name)
-    excluded = found.misses_by(box.unreachable if box.problem.pattern else box.tuning.far_off)
-    return [] if excluded else [*box.designs(found.take_first(_LEADS))]
-
-
-def _drop_limits(problem: Posed, limits: Sequence[Limit]) -> Posed:
-    """The problem without the constraints that may move."""
-    moved = {limit.name for limit in limits}
-    kept = {n: c for n, c in problem.constraints.items() if n not in moved}
-    return problem.derive(constraints=kept, minimize=None, maximize=None)
-
-
-def _find_worse_cases(wide: Posed, limits: Sequence[Limit], trial: CheckedEnd, cases: Sequence[Case]) -> list[Case]:
-    """Cases between the listed ones in which a design needs more."""
-    worst = [w.case for w in find_worst_cases(wide, trial.parameters).values()]
-    known, all_ = (_compute_amounts(wide, limits, trial.parameters, c) for c in (cases, (*cases, *worst)))
-    grown = any(abs(a) > abs(known.get(n, 0.0)) + FEASIBLE * (1 + abs(a)) for n, a in all_.items())
-    return [case for case in worst if case not in cases] if grown else []
-
-
-def _compute_amounts(
-    wide: Posed, limits: Sequence[Limit], parameters: Mapping[str, float], cases: Sequence[Case]
-) -> dict[str, float]:
-    """The amounts that a design needs, by its own recheck."""
-    excess = measure_excesses(wide, parameters, cases)
-    needed = {limit.name: (limit.measure_need(parameters, excess), limit.scale) for limit in limits}
-    return {
-        name: amount * (1 + _ROUND_UP) for name, (amount, scale) in needed.items() if abs(amount) > FEASIBLE * scale
-    }
-
-
-def find_holding_limits(nlp: NLP, limits: Sequence[Limit], trial: CheckedEnd) -> list[str]:
-    """Limits with a multiplier: without one of them, less would suffice."""
-    scales = {limit.name: limit.scale for limit in limits}
-    rows = zip(nlp.rows, trial.point.row_multipliers.tolist(), strict=True)
-    names = [row for row, multiplier in rows if row in scales and abs(multiplier) * scales[row] > _ACTIVE]
-    for k, name in enumerate(trial.end.nlp.variables):
-        multiplier = float(trial.point.bound_multipliers[k])
-        parameter = name.removeprefix("tan(").removesuffix(")")
-        width = trial.end.nlp.upper[k] - trial.end.nlp.lower[k]
-        if parameter in trial.parameters and abs(multiplier) * width > _ACTIVE:
-            names.append(f"{parameter}.{'max' if multiplier > 0 else 'min'}")
-    return names
-
-
-def relax_each_alone(
-    problem: Posed, options: Options, conflict: Sequence[str], trial: CheckedEnd, cases: Sequence[Case]
-) -> dict[str, float]:
-    """How far each limit of a conflict must move if no other does; limits that cannot help alone are left out."""
-    limits = {limit.name: limit for limit in (*_make_constraint_limits(problem), *_make_bound_limits(problem))}
-    found: dict[str, float] = {}
-    for limit in (limits[name] for name in conflict):
-        wide = widen_box(problem, [limit.parameter] if limit.parameter else [])
-        if not (leads := _propose_leads(_draw_limit_box(wide, options, limit), limit.name)):
-            continue
-        here = clip_to_box(wide, trial.parameters)
-        end = _solve_relaxation(wide, options, _build_elastic_program(wide, cases, [limit]), [limit], [here, *leads])
-        if end is not None:
-            found |= _compute_amounts(wide, [limit], end.parameters, end.end.nlp.cases)
-    return found
-
-
-def _build_elastic_program(wide: Posed, cases: Sequence[Case], limits: Sequence[Limit]) -> NLP:
-    """Minimise Σ slack/scale with each limit moved by its slack, all others kept."""
-    nlp = formulate(wide, cases, elastic=True)
-    names = [limit.name for limit in limits]
-    inputs = [symbol(variable_name(k)) for k in range(len(nlp.variables) + len(limits))]
-    x, slack = inputs[: len(nlp.variables)], inputs[len(nlp.variables) :]
-    _, *g = fold(nlp.formula, {n: symbol(n) for n in nlp.formula.names}, NODES)
-    rows: list[tuple[str, Any, float, float]] = []
-    second: list[tuple[str, Any, float, float]] = []  # last, because touches and kinks refer to rows by number
-    for k, name in enumerate(nlp.rows):
-        lower, upper = nlp.row_lower[k], nlp.row_upper[k]
-        if name not in names:
-            rows.append((name, g[k], lower, upper))
-            continue
-        s = slack[names.index(name)]
-        moved = [(name, g[k] - s, -np.inf, upper)] if np.isfinite(upper) else []
-        moved += [(name, g[k] + s, lower, np.inf)] if np.isfinite(lower) else []
-        rows.append(moved[0])
-        second += moved[1:]
-    rows += second
-    for number, limit in enumerate(limits):
-        if limit.parameter:
-            at = list(wide.free).index(limit.parameter)
-            value = atan(x[at]) if wide.parameter_set[limit.parameter].tangent else x[at]
-            most = limit.name.endswith(".max")
-            ends = (-np.inf, limit.end) if most else (limit.end, np.inf)
-            rows.append((limit.name, value - slack[number] if most else value + slack[number], *ends))
-    objective = sum(slack[k] / limit.scale for k, limit in enumerate(limits))
-    return replace(
-        nlp,
-        formulation="elastic",
-        variables=(*nlp.variables, *(f"slack of {n}" for n in names)),
-        formula=formula([objective, *(r[1] for r in rows)], (*(x.value for x in inputs), *nlp.numbers)),
-        lower=(*nlp.lower, *(0.0 for _ in names)),
-        upper=(*nlp.upper, *(np.inf for _ in names)),
-        rows=tuple(r[0] for r in rows),
-        row_lower=tuple(r[2] for r in rows),
-        row_upper=tuple(r[3] for r in rows),
-        lifts=(*nlp.lifts, AddedVariable("slack", len(names), partial(_guess_slack, wide, names))),
-    )
-
-
-def _guess_slack(wide: Posed, names: Sequence[str], values: Sequence[Values], z: Any) -> list[list[float]]:
-    """Initial slacks: what a design needs, and a little more."""
-    found = []
-    for name in names:
-        condition = wide.conditions.get(name)
-        differences = [abs(float(condition(v))) for v in values] if condition else [0.0]
-        found.append(max((d for d in differences if np.isfinite(d)), default=1.0) + 1e-3)
-    return [found]

@@ -6,16 +6,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 
+from tmsopt.problem import Posed, Solution, unit_of
 from tmsopt.problem.advice.remedies import DIGITS, RequiredValue, round_outwards
 from tmsopt.problem.dependence import STABLE
-from tmsopt.problem.problem import Posed
-from tmsopt.problem.solution import Solution
-from tmsopt.problem.unit_system import unit_of
-from tmsopt.program.options import Options
+from tmsopt.program import Options
 from tmsopt.progress import begin
 from tmsopt.records import Table
-from tmsopt.search.remedies.allowance import OutOfTime, limit_time
-from tmsopt.search.remedies.changed_problem import solve_again
+from tmsopt.search.remedies.changed_problem import OutOfTime, limit_time, solve_again
 from tmsopt.search.remedies.conflict import STARTS, search_briefly
 from tmsopt.search.state import begin_search
 
@@ -30,19 +27,17 @@ def add_required_speed(solution: Solution, options: Options) -> tuple[Solution, 
     The problem is solved again at the rounded speed that is shown. If the search meets a design inside the box that was
     missed, return it as well.
     """
-    name, problem = _find_speed(solution.problem.posed), solution.problem
-    if not name or problem.posed.cases or not problem.free or not _can_speed_help(solution):
+    problem = solution.problem.posed
+    name = _find_speed(problem)
+    if not name or problem.cases or not problem.free or not _can_speed_help(solution):
         return solution, None
-    limits = {} if set(problem.posed.asked_of_roots) or problem.posed.pattern else {STABLE: "abscissa <= 0"}
-    few = replace(options, starts=STARTS, stability=0.0, alone=False, progress=None, near=None)
+    limits = {} if problem.asked_of_roots or problem.pattern else {STABLE: "abscissa <= 0"}
+    few = replace(options, starts=STARTS, progress=None, near=None)
     began, searched = time.perf_counter(), list[float]()
     begin(options.progress, f"searching for the {name} that makes it feasible")
-    for highest, ends in _list_ranges(problem.posed, name):
-        asked = _set_range(problem.posed, name, ends).derive(
-            constraints={**problem.constraints, **limits},
-            minimize=None if highest else name,
-            maximize=name if highest else None,
-        )
+    for highest, ends in _list_ranges(problem, name):
+        goal = {"maximize": name, "minimize": None} if highest else {"minimize": name, "maximize": None}
+        asked = _set_range(problem, name, ends).derive(constraints={**problem.constraints, **limits}, **goal)
         searched += ends
         trials = [search_briefly(state) for state in begin_search(asked, few)]
         found = [t.parameters for t in trials if t and not t.checked.violations]
@@ -50,31 +45,26 @@ def add_required_speed(solution: Solution, options: Options) -> tuple[Solution, 
             design = (max if highest else min)(found, key=lambda p: p[name])
             if name in problem.free and math.isclose(design[name], ends[highest], rel_tol=_AT_END):
                 return solution, design
-            short = limit_time(options)
+            short, one = limit_time(options), unit_of(problem, name).one
+            rounded = [round_outwards(design[name] / one, not highest, digits) * one for digits in (DIGITS, 4, 2)]
             with suppress(OutOfTime):
-                for shown in _list_rounded(problem.posed, name, design[name], not highest):
-                    fixed = _set_range(problem.posed, name, (shown, shown))
-                    if solve_again(fixed, short, problem.posed, thorough=True):
+                for shown in dict.fromkeys(rounded):
+                    fixed = _set_range(problem, name, (shown, shown))
+                    if solve_again(fixed, short, problem, thorough=True):
                         need = RequiredValue(name, design[name], highest, ends, Table(design), shown)
                         return replace(solution, need=need), None
             return solution, None
         if time.perf_counter() - began > _SECONDS:
             break
-    beyond = (min(searched), max(searched)) if searched else None
-    return (replace(solution, need=RequiredValue(name, math.nan, False, beyond)) if beyond else solution), None
+    if searched:
+        solution = replace(solution, need=RequiredValue(name, math.nan, False, (min(searched), max(searched))))
+    return solution, None
 
 
 def _set_range(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
     """The problem with another range of a parameter; with equal ends, the parameter is fixed."""
-    freed = {**problem.free, name: ends}
-    free = {n: freed[n] for n in problem.parameter_set.names if n in freed}
-    return problem.derive(fixed={n: x for n, x in problem.fixed.items() if n != name}, free=free, start={})
-
-
-def _list_rounded(problem: Posed, name: str, value: float, up: bool) -> Iterator[float]:
-    """The value rounded to fewer and fewer digits, towards where a design exists."""
-    one = unit_of(problem, name).one
-    yield from dict.fromkeys(round_outwards(value / one, up, digits) * one for digits in (DIGITS, 4, 2))
+    free, fixed = {**problem.free, name: ends}, {n: x for n, x in problem.fixed.items() if n != name}
+    return problem.derive(fixed=fixed, free={n: free[n] for n in problem.parameter_set.names if n in free}, start={})
 
 
 def _can_speed_help(solution: Solution) -> bool:
@@ -96,9 +86,7 @@ def _find_speed(problem: Posed) -> str:
 def _list_ranges(problem: Posed, name: str) -> Iterator[tuple[bool, tuple[float, float]]]:
     """Ranges to search: above the allowed speeds, then below them; False, True: whether to maximise the speed."""
     low, high = problem.free.get(name, (problem.fixed.get(name, math.nan),) * 2)
-    middle = {
-        n: sum(problem.free[n]) / 2 if n in problem.free else problem.fixed[n] for n in problem.parameter_set.names
-    }
+    middle = {**problem.fixed, **{n: sum(ends) / 2 for n, ends in problem.free.items()}}
     unit = math.sqrt(middle["g"] * middle["w"]) if {"g", "w"} <= middle.keys() else 1.0
     top = min(max(_FASTEST * unit, _TIMES * high), problem.parameter_set[name].range.upper)
     if high < top:

@@ -3,20 +3,19 @@
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from helpers.skates import skate
 
 import tmsopt
 from tmsopt.cli import every as main
-from tmsopt.models import from_coefficients, from_matrices
+from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
+from tmsopt.search import estimate_coverage
 
-pytestmark = pytest.mark.slow
-
-c1, c2 = ca.SX.sym("c1"), ca.SX.sym("c2")
+c1, c2, x = (ca.SX.sym(n) for n in ("c1", "c2", "x"))
 
 
 def oscillators(k, w, box=(-2, 2), **asked):
@@ -43,6 +42,7 @@ def meeting(k, w):
     return (mean + delta, mean - delta) if mean > 0 else (-mean - delta, -mean + delta)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("k", "w"), [(0.3, 1.2), (0.1, 1.5)])
 def test_both_cep2_of_two_oscillators(k, w):
     one = np.array(meeting(k, w))
@@ -56,6 +56,7 @@ def test_both_cep2_of_two_oscillators(k, w):
     assert sorted(s.abscissa for s in found) == pytest.approx(sorted([-b / 2, b / 2]), abs=1e-11)
 
 
+@pytest.mark.slow
 def test_a_box_with_one_of_them_or_none():
     stable = all_of(oscillators(0.3, 1.2, (0, 2)), starts=12)
     (design,) = stable.solutions
@@ -67,16 +68,17 @@ def test_a_box_with_one_of_them_or_none():
     assert none.coverage.chance == pytest.approx(3 / none.coverage.starts)  # the rule of three
 
 
+@pytest.mark.slow
 def test_constraints_choose_among_them():
     chosen = all_of(oscillators(0.3, 1.2, constraints={"unstable": "c1 + c2 <= 0"}), starts=12).solutions
     assert [s.parameters["c1"] for s in chosen] == [pytest.approx(-meeting(0.3, 1.2)[0], abs=1e-11)]
 
 
+@pytest.mark.slow
 def test_both_exchanged_ep3_of_three_masses():
     """K = [[μ + 1, −1, 0], [−1, 2, −1], [0, −1, ν + 1]] has a 3-fold λ where 3λ = tr K, 3λ² = minors, λ³ = det K."""
-    problem = tmsopt.load(Path(__file__).parents[2] / "problems" / "three_masses.toml")
-    free = tmsopt.Problem(model=problem.model, free=problem.free, locate="CEP3")
-    found = all_of(free, starts=16).solutions
+    problem = tmsopt.load("problems/three_masses.toml")
+    found = all_of(tmsopt.Problem(problem.model, free=problem.free, locate="CEP3"), starts=16).solutions
     values = [complex(s.parameters["mu_r"], s.parameters["mu_i"]) for s in found]
     partners = [complex(s.parameters["nu_r"], s.parameters["nu_i"]) for s in found]
     for mu, nu in zip(values, partners, strict=True):
@@ -89,6 +91,7 @@ def test_both_exchanged_ep3_of_three_masses():
     assert {s.structure for s in found} == {"CEP3"}
 
 
+@pytest.mark.slow
 def test_two_solutions_close_to_each_other_are_not_told_to_more_digits_than_hold():
     """(s + 1)² + (y − 1/2) (y − 0.5000001): rounding of the 1 moves y by 1e-9, for the slope is 1e-7."""
     y = ca.SX.sym("y")
@@ -98,29 +101,30 @@ def test_two_solutions_close_to_each_other_are_not_told_to_more_digits_than_hold
         assert abs(solution.parameters["y"] - true) <= errors["y"] < 1e-7
 
 
+@pytest.mark.slow
 def test_coverage_says_how_much_was_looked_at():
     """w (n − 1)/(n − w − 2) solutions expected for w found in n hits (Boender and Rinnooy Kan 1987)."""
-    coverage = tmsopt.solve_all(oscillators(0.3, 1.2), seconds=0).coverage
+    coverage, few = (tmsopt.solve_all(oscillators(0.3, 1.2), seconds=0, starts=n).coverage for n in (1024, 2))
     w, n = len(coverage.hits), sum(coverage.hits)
     assert w == 2
     assert min(coverage.hits) >= 3
     assert coverage.hits == tuple(sorted(coverage.hits, reverse=True))
     assert coverage.expected == pytest.approx(w * (n - 1) / (n - w - 2))
     assert 0 < coverage.chance <= 3 / coverage.starts
-    few = tmsopt.solve_all(oscillators(0.3, 1.2), starts=2, seconds=0).coverage
     assert few.starts == 2
     assert few.chance > coverage.chance
 
 
+@pytest.mark.slow
 def test_the_same_is_found_from_other_starts_and_again():
     first, again, other = (all_of(oscillators(0.3, 1.2), seed=s, starts=12) for s in (0, 0, 5))
-    assert first.to_json()["coverage"] == again.to_json()["coverage"]
-    assert [dict(s.parameters) for s in first.solutions] == [dict(s.parameters) for s in again.solutions]
-    names = ("c1", "c2")
-    found = [sorted([s.parameters[n] for n in names] for s in every.solutions) for every in (first, other)]
+    assert first.coverage == again.coverage
+    assert [s.parameters for s in first.solutions] == [s.parameters for s in again.solutions]
+    found = [sorted((s.parameters["c1"], s.parameters["c2"]) for s in every.solutions) for every in (first, other)]
     assert np.allclose(*found, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_of_seven_roots():
     """With the product 2⁷ all meet at −2 alone."""
     row = [math.comb(7, j) * 2.0**j for j in range(8)]
@@ -132,43 +136,37 @@ def test_of_seven_roots():
     assert design.abscissa == pytest.approx(-2, abs=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("problem", "said"),
+    ("asked", "said"),
     [
-        (oscillators(0.3, 1.2, locate=None, minimize="abscissa"), "needs a pattern and no objective"),
-        (oscillators(0.3, 1.2, minimize="c1"), "needs a pattern and no objective"),
-        (
-            oscillators(0.3, 1.2, locate="EP2"),
-            "2 free parameters and 1 condition .*; free fewer",
+        ({"locate": None, "minimize": "abscissa"}, "needs a pattern and no objective"),
+        ({"minimize": "c1"}, "needs a pattern and no objective"),
+        ({"locate": "EP2"}, "2 free parameters and 1 condition .*; free fewer"),
+        ({"locate": "EP4"}, "2 free parameters and 3 conditions .*; free more"),
+        ({"constraints": {"sum": "c1 + c2 == 1"}}, "isolated solutions; free more"),
+        ({"tolerances": {"c1": 0.1}}, "isolated solutions"),
+        (  # what only the roots define
+            {"constraints": {"damped": "damping_ratio >= 0.1"}},
+            "the constraints use damping_ratio, .*accepted: parameters, coefficients, and quantities with a formula",
         ),
-        (
-            oscillators(0.3, 1.2, locate="EP4"),
-            "2 free parameters and 3 conditions .*; free more",
-        ),
-        (oscillators(0.3, 1.2, constraints={"sum": "c1 + c2 == 1"}), "isolated solutions; free more"),
-        (oscillators(0.3, 1.2, tolerances={"c1": 0.1}), "isolated solutions"),
     ],
 )
-def test_problems_without_single_solutions_are_refused(problem, said):
+def test_problems_without_single_solutions_are_refused(asked, said):
     with pytest.raises(tmsopt.InputError, match=said):
-        tmsopt.solve_all(problem)
+        tmsopt.solve_all(oscillators(0.3, 1.2, **asked))
 
 
+@pytest.mark.slow
 def test_a_constraint_on_a_quantity_with_an_equation_of_its_own():
     """ω0 is an unknown beside those of the pattern; written by its formula, the bicycle is the same."""
-    file = Path(__file__).parents[2] / "problems" / "optimised_benchmark.toml"
-    problem = tmsopt.load(file)
+    problem = tmsopt.load("problems/optimised_benchmark.toml")
     for asked in (problem, replace(problem, constraints={"decay": "a4 == a0"})):
         (design,) = all_of(asked, starts=4).solutions
         assert design.parameters["mu"] == pytest.approx(20.84626701, rel=1e-9)
 
 
-def test_a_constraint_on_what_only_the_roots_define_is_refused():
-    said = "the constraints use damping_ratio, .*accepted: parameters, coefficients, and quantities with a formula"
-    with pytest.raises(tmsopt.InputError, match=said):
-        tmsopt.solve_all(oscillators(0.3, 1.2, constraints={"damped": "damping_ratio >= 0.1"}))
-
-
+@pytest.mark.slow
 def test_of_the_command_line(tmp_path):
     file = tmp_path / "own.toml"
     file.write_text(
@@ -187,28 +185,30 @@ locate = "CEP2"
 """,
         encoding="utf-8",
     )
-    result = CliRunner().invoke(main, ["solve", str(file), "--all", "--json"])
-    data = json.loads(result.stdout)
-    assert result.exit_code == 0
-    assert sorted(s["parameters"]["c1"] for s in data["solutions"]) == pytest.approx(
-        sorted([meeting(0.3, 1.2)[0], -meeting(0.3, 1.2)[0]]), abs=1e-11
-    )
-    text = CliRunner().invoke(main, ["solve", str(file), "--all"]).output
-    assert "locate CEP2: 2 solutions in the box, no other exists (proved; " in text
+
+    def answer(*words):
+        result = CliRunner().invoke(main, ["solve", str(file), "--all", *words])
+        assert result.exit_code == 0
+        return result.stdout
+
+    data, c1_of_one = json.loads(answer("--json")), abs(meeting(0.3, 1.2)[0])
+    assert sorted(s["parameters"]["c1"] for s in data["solutions"]) == pytest.approx([-c1_of_one, c1_of_one], abs=1e-11)
+    assert "locate CEP2: 2 solutions in the box, no other exists (proved; " in answer()
     assert data["completeness"]["complete"]
     assert (data["complete"], data["undecided"]) == (True, 0)
     assert [s["proved"] for s in data["solutions"]] == [True, True]
     assert data["coverage"] is None
-    text = CliRunner().invoke(main, ["solve", str(file), "--all", "--seconds", "0.001"]).output
+    text = answer("--seconds", "0.001")
     assert "locate CEP2: 2 solutions in the box" in text
     assert "no proof that these are all: time limit reached" in text
     assert "undecided: c1 -2 … 2, c2 -2 … 2" in text
     assert "95 % confidence; no proof" in text
-    data = json.loads(CliRunner().invoke(main, ["solve", str(file), "--all", "--json", "--seconds", "0.001"]).stdout)
+    data = json.loads(answer("--json", "--seconds", "0.001"))
     assert (data["complete"], data["undecided"]) == (False, len(data["completeness"]["undecided"]))
     assert data["undecided"] >= 1
 
 
+@pytest.mark.slow
 def test_a_continuum_of_solutions_is_told_from_none():
     """s⁴ + (Om² − 1 − k) s² + k: both pairs meet wherever Om = 1 + √k, a whole curve, for there is no damping."""
     Om, k = ca.SX.sym("Om"), ca.SX.sym("k")
@@ -219,20 +219,20 @@ def test_a_continuum_of_solutions_is_told_from_none():
     assert every.coverage.singular > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("free", "named"), [({"Fr": (0.5, 4.0)}, "EP2"), ({"Fr": (0.5, 4.0), "chi_B": (1.1, 2.0)}, "EP3")]
 )
 def test_the_pattern_that_is_suggested_has_as_many_conditions_as_there_are_free_parameters(free, named):
     """A k-fold root takes k − 1 conditions."""
-    fixed = {"Fr": 2.0, "chi_B": 1.4, "chi_H": 1.0, "mu": 0.1, "zeta_B": -0.4, "zeta_H": -0.2, "lambda_s": 0.3}
-    fixed = {n: x for n, x in fixed.items() if n not in free}
     with pytest.raises(tmsopt.InputError, match=f"locate = '{named}'"):
-        tmsopt.solve_all(tmsopt.Problem(tmsopt.models.tms, fixed=fixed, free=free, minimize="abscissa"))
+        tmsopt.solve_all(skate(free, {"Fr": 2.0, "chi_B": 1.4, "lambda_s": 0.3}, minimize="abscissa"))
 
 
+@pytest.mark.slow
 def test_designs_at_a_parameter_that_is_zero():
     """H = [[10 + d − i, k], [k, 10 − d − 3i]]: 4 (d + i)² + 4 k² = 0 at d = 0 and k = ±1 alone, where ω = 10 − 2i."""
-    dimer = tmsopt.models.from_matrices(
+    dimer = from_matrices(
         A=[[-1, 0, "10 + d", "k"], [0, -3, "k", "10 - d"], ["-10 - d", "-k", -1, 0], ["-k", "-10 + d", 0, -3]]
     )
     problem = tmsopt.Problem(dimer, free={"d": (-5, 5), "k": (-5, 5)}, locate="CEP2")
@@ -247,24 +247,64 @@ def test_designs_at_a_parameter_that_is_zero():
         assert float(proof.parameters["d"].value) == pytest.approx(0, abs=1e-50)
 
 
+@pytest.mark.slow
 def test_double_exceptional_points_of_a_chain_with_gain_and_loss():
     """det(ω − H) = (ω² + bω + c)² of the matrix itself; H → −H* mirrors d1, d2, and one design is its own image."""
-    d1, d2, g1, g2 = (ca.SX.sym(n) for n in ("d1", "d2", "g1", "g2"))
-    rows = [[(d1, g1), 1, 0, 0], [1, (d2, -g2), 0.4, 0], [0, 0.4, 0.9j, 1], [0, 0, 1, -0.8j]]
+
+    def chain(first, second):
+        return [[first, 1, 0, 0], [1, second, 0.4, 0], [0, 0.4, 0.9j, 1], [0, 0, 1, -0.8j]]
+
     free = {"d1": (-1, 1), "d2": (-1, 1), "g1": (0, 2), "g2": (0, 2)}
-    chain = tmsopt.Problem(tmsopt.models.from_hamiltonian(rows), free=free, locate="EP2+EP2")
-    every = all_of(chain)
-    designs = [[s.parameters[n] for n in free] for s in every.solutions]
+    model = from_hamiltonian(chain("d1 + 1j*g1", "d2 - 1j*g2"))
+    problem = tmsopt.Problem(model, free=free, locate="EP2+EP2")
+    every = all_of(problem)
+    designs = np.array([[s.parameters[n] for n in free] for s in every.solutions])
     for a, b, g, h in designs:
-        H = np.array([[a + 1j * g, 1, 0, 0], [1, b - 1j * h, 0.4, 0], [0, 0.4, 0.9j, 1], [0, 0, 1, -0.8j]])
-        p = np.poly(H)
-        half = p[1] / 2
-        square = np.convolve(*[[1, half, (p[2] - half**2) / 2]] * 2)
-        assert np.allclose(p, square, rtol=0, atol=1e-10)
-    mirrored = [[-a, -b, g, h] for a, b, g, h in designs]
+        p = np.poly(np.array(chain(a + 1j * g, b - 1j * h)))
+        half = [1, p[1] / 2, (p[2] - p[1] ** 2 / 4) / 2]
+        assert np.allclose(p, np.convolve(half, half), rtol=0, atol=1e-10)
     assert len(designs) == 3
-    assert all(min(np.abs(np.subtract(x, y)).max() for y in designs) < 1e-9 for x in mirrored)
-    one = tmsopt.solve(chain).parameters
-    assert min(np.abs(np.subtract([one[n] for n in free], y)).max() for y in designs) < 1e-9
+    one = tmsopt.solve(problem).parameters
+    for met in (*designs * [-1, -1, 1, 1], [one[n] for n in free]):
+        assert np.abs(designs - met).max(axis=1).min() < 1e-9
     assert every.coverage is not None
     assert min(every.coverage.hits) >= 3
+
+
+# The ends of a box, and how far a statement of coverage may be trusted
+
+
+@pytest.mark.parametrize("seconds", [0, 60], ids=["search", "proof"])
+@pytest.mark.parametrize("ends", [(-2.0, 2.0), (-2.0, 5.0), (-5.0, 2.0), (-1.999, 5.0), (-5.0, 1.999)])
+def test_a_box_has_the_solutions_on_its_ends_and_none_beyond(ends, seconds):
+    """s² + x s + 1 has double roots at x = ±2."""
+    problem = tmsopt.Problem(from_coefficients([1, x, 1]), free={"x": ends}, locate="EP2")
+    found = sorted(s.parameters["x"] for s in tmsopt.solve_all(problem, seconds=seconds).solutions)
+    assert found == pytest.approx([at for at in (-2, 2) if ends[0] <= at <= ends[1]], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "shares",
+    [np.ones(20), np.ones(400), 0.8 ** np.arange(60), 1 / np.arange(1, 400) ** 1.5, np.array([1.0, 0.02, 0.02, 0.02])],
+    ids=["20 alike", "400 alike", "each a fifth rarer", "a long tail", "three rare ones"],
+)
+def test_the_chance_of_another_solution_is_claimed_with_95_percent_confidence(shares):
+    """Starts drawn at random, each led to one solution with a known chance: that of those not met is known too."""
+    shares = shares / shares.sum()
+    rng = np.random.default_rng(0)
+    for starts in (50, 100, 200):
+        drawn = rng.multinomial(starts, shares, size=2000)
+        kept = sum(
+            shares[row == 0].sum() <= estimate_coverage(starts, [int(h) for h in row if h], 0).chance for row in drawn
+        )
+        assert kept >= 0.95 * 2000
+
+
+@pytest.mark.parametrize("rate", [1e-9, 1e6, 1e12])
+def test_all_EP2_of_a_dimer_in_any_unit(rate):
+    """k = |g1 − g2|/2 and d = 0 alone: the discriminant (d − i (g1 − g2))² + 4 k² is 0 nowhere else with k > 0."""
+    dimer = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])
+    free = {"d": (-5 * rate, 5 * rate), "k": (rate / 10, 5 * rate)}
+    every = tmsopt.solve_all(tmsopt.Problem(dimer, fixed={"g1": 3 * rate, "g2": rate}, free=free, locate="EP2"))
+    assert every.complete
+    assert [s.parameters["k"] / rate for s in every.solutions] == [pytest.approx(1, rel=1e-12)]
