@@ -25,12 +25,12 @@ from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.limit import limit_value
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_QUANTITIES
-from tmsopt.program.angular_frequency import lift_angular_frequency
 from tmsopt.program.boundary_points import lift_boundary_points, lift_displacements
 from tmsopt.program.kinks import epigraph_form
 from tmsopt.program.lifts import (
     LiftedQuantity,
     lift_abscissa,
+    lift_angular_frequency,
     lift_damping_ratio,
     lift_positive_root,
     lift_quantity,

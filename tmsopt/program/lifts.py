@@ -61,51 +61,67 @@ class LiftedQuantity:
     products: tuple[tuple[Factor, ...], ...]
 
 
-def lift_factors(
+def _lift_by_factors(
     build: ProgramBuilder,
     name: str,
-    quadratic: Callable[[int, int, Any], tuple[list[Any], list[Contact]]],
-    squared: bool = False,
+    bounds: tuple[float, float],
+    quadratic: Callable[[Any, int, int, Any], tuple[list[Any], list[Contact]]],
+    place: Callable[[bool, Roots, float], float],
+    unit: float = 1.0,
     linear: tuple[str, float] = ("d", 0.0),
-    line: Any = None,
-) -> tuple[list[Contact], tuple[tuple[Factor, ...], ...]]:
-    """Write the polynomial of each covered case as a product of quadratic factors, and a linear one for an odd degree.
+    all_real: float | None = None,
+    is_shifted: bool = False,
+    squared: bool = False,
+) -> LiftedQuantity:
+    """A root quantity as a variable v, with the polynomial of each covered case as a product of quadratic factors.
+
+    An odd degree adds one linear factor.
 
     Args:
-        quadratic: (number, case, lead) → coefficients and contacts of a factor; `lead` is ±a0 in the factor that takes
-            it so that the NLP reaches a0 = 0, else None.
-        squared: see `Factor`.
+        name: of the quantity and of its rows.
+        bounds: of v.
+        quadratic: (v, number, case, lead) → coefficients and contacts of a factor; `lead` is ±a0 in the factor that
+            takes it so that the NLP reaches a0 = 0, else None.
+        place: (near a solution, roots, their mean size) → starting value of v, for which the factors are feasible.
+        unit: of v.
         linear: name and lower bound of the constant term of the linear factor.
-        line: shift of the polynomial, to a line that the linear factor's root may be on.
-
-    Returns:
-        All contacts, and the factors of each case.
+        all_real: the value of v that real roots alone allow.
+        is_shifted: whether the polynomials are shifted by v, so that a root of a linear factor may be on the edge.
+        squared: see `Factor`.
     """
-    lead, contacts, products = build.lead, list[Contact](), list[tuple[Factor, ...]]()
+    first = build.size[0]
+    edge = build.variable(name, *bounds)
+    contacts = [] if all_real is None else [Contact(lambda x: all_real, variable=first, value=all_real)]
+    lead, products = build.lead, list[tuple[Factor, ...]]()
     for case in build.covered_cases:
         a, factors, monic = build.polynomial(case), list[Factor](), list[list[Any]]()
         count, odd = divmod(len(a) - 1, 2)
         if lead:
             build.row("a0", lead * a[0], 0.0, np.inf)
         for k in range(1, count + 1):
-            at, own = build.size[0], lead * a[0] if lead and k == 1 and not odd else None
-            coefficients, own_contacts = quadratic(k, case, own)
+            at, factor_lead = build.size[0], lead * a[0] if lead and k == 1 and not odd else None
+            coefficients, factor_contacts = quadratic(edge, k, case, factor_lead)
             monic.append(coefficients)
-            if own is None:
+            if factor_lead is None:
                 factors.append(Factor(at, squared=squared))
-            if own is None or count == 1:  # the largest roots are not on the edge
-                contacts += own_contacts
+            if factor_lead is None or count == 1:  # the largest roots are not on the edge
+                contacts += factor_contacts
         if odd:
             at, (letter, lower) = build.size[0], linear
             monic.append([lead * a[0] if lead else 1, build.variable(f"{letter}.{case}", lower)])
             if not lead:
                 factors.append(Factor(at, linear=True))
-            if line is not None and (not lead or not count):
+            if is_shifted and (not lead or not count):
                 contacts.append(Contact(partial(_step_distance, at), variable=at))
-        left = a if line is None else shift(a, line)
-        build.equal(name, left, [(lead or a[0]) * c for c in product(*monic)])
+        build.equal(name, shift(a, edge) if is_shifted else a, [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
-    return contacts, tuple(products)
+    scale = abs(lead) / build.leading_unit
+    guesses = (
+        partial(_guess_factors, build.covered_cases, scale, is_shifted, squared, partial(place, is_near))
+        for is_near in (False, True)
+    )
+    lift = AddedVariable(name, build.size[0] - first, *guesses)
+    return LiftedQuantity(unit * edge, lift, tuple(contacts), tuple(products))
 
 
 def lift_abscissa(build: ProgramBuilder) -> LiftedQuantity:
@@ -115,21 +131,21 @@ def lift_abscissa(build: ProgramBuilder) -> LiftedQuantity:
     reaches a0 = 0, the first factor is ±a0 t² + βt + κ, so that a root may go to infinity; for an odd degree the linear
     factor is ±a0 t + δ instead.
     """
-    first = build.size[0]
-    gamma = build.variable("abscissa")
 
-    def quadratic(k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
+    def quadratic(gamma: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
         at = build.size[0]
         beta, kappa = build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)
         distances = (_pair_distance, _real_distance)
         contacts = [Contact(partial(distance, at), variable=at + j) for j, distance in enumerate(distances)]
         return [1 if lead is None else lead, beta, kappa], contacts
 
-    contacts, products = lift_factors(build, "abscissa", quadratic, linear=("delta", 0.0), line=gamma)
-    scale = abs(build.lead) / build.leading_unit
-    guess, close = (partial(_abscissa_guess, build.covered_cases, near, scale) for near in (False, True))
-    lift = AddedVariable("abscissa", build.size[0] - first, guess, close)
-    return LiftedQuantity(build.unit * gamma, lift, tuple(contacts), products)
+    def place(is_near: bool, z: Roots, size: float) -> float:
+        """γ right of the rightmost root; near a solution by a tenth of the abscissa, which may be tiny, or less."""
+        right, step = float(z.real.max()), 0.05 * size
+        return right + (min(step, 0.1 * abs(right)) + 1e-6 if is_near else step + 1e-3)
+
+    bounds = (-np.inf, np.inf)
+    return _lift_by_factors(build, "abscissa", bounds, quadratic, place, build.unit, ("delta", 0.0), is_shifted=True)
 
 
 def lift_damping_ratio(build: ProgramBuilder) -> LiftedQuantity:
@@ -139,10 +155,8 @@ def lift_damping_ratio(build: ProgramBuilder) -> LiftedQuantity:
     s + d, d ≥ 0. If the NLP reaches a0 = 0, the first factor is m² s² + p s + w² with m² = ±a0 and p ≥ 2 ζ m w; for an
     odd degree the linear factor is ±a0 s + d instead.
     """
-    first = build.size[0]
-    zeta = build.variable("damping_ratio", -1.0, 1.0)
 
-    def quadratic(k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
+    def quadratic(zeta: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
         at = build.size[0]
         p, w, m = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0), 1.0
         if lead is not None:
@@ -151,11 +165,33 @@ def lift_damping_ratio(build: ProgramBuilder) -> LiftedQuantity:
         build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
         return [m * m, p, w * w], [Contact(partial(_sector_distance, at), row=build.size[1] - 1)]
 
-    contacts, products = lift_factors(build, "damping_ratio", quadratic, squared=True)
-    guess = partial(_damping_guess, build.covered_cases, abs(build.lead) / build.leading_unit)
-    lift = AddedVariable("damping_ratio", build.size[0] - first, guess)
-    all_real = Contact(lambda x: 1.0, variable=first, value=1.0)
-    return LiftedQuantity(zeta, lift, (all_real, *contacts), products)
+    def place(is_near: bool, z: Roots, size: float) -> float:
+        """ζ slightly below the smallest damping ratio."""
+        return float(np.clip(np.min(-z.real / (np.abs(z) + 1e-300)) - 0.05, -0.95, 0.95))
+
+    return _lift_by_factors(build, "damping_ratio", (-1.0, 1.0), quadratic, place, all_real=1.0, squared=True)
+
+
+def lift_angular_frequency(build: ProgramBuilder) -> LiftedQuantity:
+    """Ω with p = a0 ∏ (s² + pᵢ s + qᵢ), pᵢ² + 4 Ω² ≥ 4 qᵢ, Ω ≥ 0, in every case: at or above every |Im s|.
+
+    All roots are in the strip |Im s| ≤ Ω. pᵢ² + 4 Ω² = 4 qᵢ puts a pair on its edge; real roots alone allow Ω = 0. An
+    odd degree adds one factor s + d. If the NLP reaches a0 = 0, the first factor is m s² + p s + q with m = ±a0 and
+    p² + 4 m² Ω² ≥ 4 m q; for an odd degree the linear factor is m s + d instead.
+    """
+
+    def quadratic(omega: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
+        at = build.size[0]
+        p, q, m = build.variable(f"p{k}.{case}"), build.variable(f"q{k}.{case}"), 1 if lead is None else lead
+        build.row("angular_frequency", p * p + 4 * m * m * omega * omega - 4 * m * q, 0.0, np.inf)
+        return [m, p, q], [Contact(partial(_strip_distance, at), row=build.size[1] - 1)]
+
+    def place(is_near: bool, z: Roots, size: float) -> float:
+        """Ω slightly above its value."""
+        return float(np.abs(z.imag).max()) + (1e-6 if is_near else 0.05 * size + 1e-3)
+
+    bounds, linear = (0.0, np.inf), ("d", -np.inf)
+    return _lift_by_factors(build, "angular_frequency", bounds, quadratic, place, build.unit, linear, all_real=0.0)
 
 
 def lift_positive_root(build: ProgramBuilder) -> AddedVariable:
@@ -244,6 +280,12 @@ def _sector_distance(at: int, x: Array) -> float:
     return float(p / (2 * w)) if w > 0 else np.inf
 
 
+def _strip_distance(at: int, x: Array) -> float:
+    """Minus the imaginary part of a pair, the largest of which is on the edge; positive for two real roots."""
+    square = x[at] ** 2 / 4 - x[at + 1]
+    return float(np.copysign(np.sqrt(abs(square)), square))
+
+
 def _finite(value: Any) -> float:
     return float(value) if np.isfinite(value) else 1.0
 
@@ -283,18 +325,32 @@ def factors_of(z: Roots, gamma: float, lead: float = 1.0) -> list[float]:
     return [float(c) for factor in each for c in factor]
 
 
-def _abscissa_guess(
-    cases: Sequence[int], near: bool, lead_scale: float, values: Sequence[Values], z: Sequence[Roots]
+def _guess_factors(
+    cases: Sequence[int],
+    lead_scale: float,
+    is_shifted: bool,
+    squared: bool,
+    place: Callable[[Roots, float], float],
+    values: Sequence[Values],
+    z: Sequence[Roots],
 ) -> list[list[float]]:
-    """γ slightly right of the rightmost root, and the factors of the shifted polynomials: exactly feasible.
+    """The variable of `_lift_by_factors` where `place` puts it, and factors that match the coefficients exactly.
 
-    `near` a solution the step is at most a tenth of the abscissa, which may be far smaller than the roots.
+    Args:
+        lead_scale: |a0| in the NLP relative to a0; 0 if the factors are monic.
     """
-    every = np.concatenate([z[case] for case in cases])
-    right, step = float(every.real.max()), 0.05 * float(np.abs(every).mean())
-    gamma = right + (min(step, 0.1 * abs(right)) + 1e-6 if near else step + 1e-3)
-    leads = [lead_scale * abs(float(values[case].coefficients[0])) if lead_scale else 1.0 for case in cases]
-    return [[gamma, *(c for case, a0 in zip(cases, leads, strict=True) for c in factors_of(z[case], gamma, a0))]]
+    roots = np.concatenate([z[case] for case in cases])
+    edge = place(roots, float(np.abs(roots).mean()))
+    guess = [edge]
+    for case in cases:
+        a0 = lead_scale * abs(float(values[case].coefficients[0])) if lead_scale else 1.0
+        factors = factors_of(z[case], edge if is_shifted else 0.0, a0)
+        if squared:
+            factors = [float(np.sqrt(abs(c))) if k % 2 else c for k, c in enumerate(factors)]
+            if lead_scale and len(z[case]) % 2 == 0:
+                factors.insert(2, float(np.sqrt(a0)))
+        guess += factors
+    return [guess]
 
 
 def _real_guess(cases: Sequence[int], line: bool, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
@@ -303,20 +359,6 @@ def _real_guess(cases: Sequence[int], line: bool, values: Sequence[Values], z: S
     gamma = min(float(every.real.max()) + 0.05 * float(np.abs(every).mean()) + 1e-3, -1e-3) if line else 0.0
     steps = [np.diff(np.sort(np.maximum(gamma - z[case].real, 1e-3)), prepend=0.0) for case in cases]
     return [[*([gamma] if line else []), *(float(d) for part in steps for d in part)]]
-
-
-def _damping_guess(
-    cases: Sequence[int], lead_scale: float, values: Sequence[Values], z: Sequence[Roots]
-) -> list[list[float]]:
-    """ζ slightly below its value, p and w of every factor, and m if `lead_scale` is not 0."""
-    every = np.concatenate([z[case] for case in cases])
-    found = [min(max(float(np.min(-every.real / (np.abs(every) + 1e-300))) - 0.05, -0.95), 0.95)]
-    for case in cases:
-        a0 = lead_scale * abs(float(values[case].coefficients[0])) if lead_scale else 1.0
-        factors = factors_of(z[case], 0.0, a0)
-        roots = [np.sqrt(abs(c)) if k % 2 else c for k, c in enumerate(factors)]
-        found += [*roots[:2], *([np.sqrt(a0)] if lead_scale and len(z[case]) % 2 == 0 else []), *roots[2:]]
-    return [[float(x) for x in found]]
 
 
 def _positive_guess(case: int, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
