@@ -372,11 +372,15 @@ def test_what_a_change_does_is_said_in_the_words_of_a_model():
     assert describe_robustness(robustness(oscillator(1.0, 0.1, 2.0), weights={"c": 1.0})) == (
         "a change of 0.1 in the weights makes it unstable (flutter)"
     )
-    assert describe_robustness(robustness(oscillator(1.0, 0.1, 2.0), weights={"k": 1.0})).endswith("makes it unstable (divergence)")
+    assert describe_robustness(robustness(oscillator(1.0, 0.1, 2.0), weights={"k": 1.0})).endswith(
+        "makes it unstable (divergence)"
+    )
     assert describe_robustness(robustness(oscillator(1.0, -0.1, 2.0), weights={"c": 0.05})) == (
         "not stable; a change of 2 in the weights makes it stable"
     )
-    assert describe_robustness(robustness(problem(FORWARD), weights={"Fr": FORWARD["Fr"]})).endswith("makes it unstable (weave)")
+    assert describe_robustness(robustness(problem(FORWARD), weights={"Fr": FORWARD["Fr"]})).endswith(
+        "makes it unstable (weave)"
+    )
 
 
 def test_no_boundary_point_is_one_of_cancellation_alone():
