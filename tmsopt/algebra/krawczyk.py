@@ -19,7 +19,7 @@ from tmsopt.records import Table
 System = Callable[[Mapping[str, Any]], list[Any]]
 """Left-hand sides of the equations, as a function of balls or series by name."""
 
-_STEPS = 60
+_STEPS = 60  # of Newton's method
 _DECADES = 80  # powers of ten over which the radius of the box is reduced
 _BOXES_PER_DECADE = 4
 
@@ -51,7 +51,7 @@ def jacobian(system: System, at: Mapping[str, Any], names: Sequence[str]) -> Any
 def refine_solution(
     system: System, start: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = Table()
 ) -> dict[str, Any]:
-    """Find the solution near a start, as exact midpoints, by Newton's method at the working precision.
+    """Find the solution near a start by Newton's method at the working precision; the results are exact midpoints.
 
     Args:
         digits: relative accuracy at which the iteration stops, in decimal digits.
@@ -86,7 +86,7 @@ def _solve_linear(matrix: Any, right: Any) -> Any:
 def enclose_solution(
     system: System, middle: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = Table()
 ) -> Enclosure:
-    """Enclose the solution near a midpoint that is right to `digits`.
+    """Enclose the solution near a midpoint that is correct to `digits` digits.
 
     The smallest box that proves the solution gives the balls, the largest one the uniqueness.
 

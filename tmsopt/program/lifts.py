@@ -1,4 +1,4 @@
-"""Root quantities as variables with polynomial factors: statements about roots without computing a root."""
+"""Writes root quantities as variables of an NLP, defined by polynomial factors: no root is computed."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -28,11 +28,11 @@ class ProgramBuilder(Protocol):
         """Equate coefficient lists."""
 
     def polynomial(self, case: int) -> list[Any]:
-        """Coefficients in one case, in the NLP's unit of the roots."""
+        """Coefficients in one case, in the units of the NLP."""
 
     @property
     def covered_cases(self) -> Sequence[int]:
-        """Numbers of the cases over which root quantities are the worst."""
+        """Numbers of the cases over which a root quantity takes its worst value."""
 
     @property
     def unit(self) -> float:
@@ -40,7 +40,7 @@ class ProgramBuilder(Protocol):
 
     @property
     def lead(self) -> int:
-        """Sign of a0 in an NLP that reaches a0 = 0; else 0."""
+        """Sign of a0 in an NLP whose feasible set includes a0 = 0; 0 otherwise."""
 
     @property
     def leading_unit(self) -> float:
@@ -53,7 +53,14 @@ class ProgramBuilder(Protocol):
 
 @dataclass(frozen=True)
 class LiftedQuantity:
-    """A root quantity as a variable."""
+    """A root quantity as a variable.
+
+    Attributes:
+        symbol: the quantity, in the units of the problem.
+        lift: its variables and their starting values.
+        contacts: the ways in which a root can lie on the edge of the region that the variable bounds.
+        products: the factors of each case.
+    """
 
     symbol: Any
     lift: AddedVariable
@@ -204,10 +211,13 @@ def lift_positive_root(build: ProgramBuilder) -> AddedVariable:
 
 
 def lift_real_roots(build: ProgramBuilder, line: bool) -> LiftedQuantity:
-    """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case; γ = 0 without a `line`.
+    """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case.
 
     This takes half as many equations as sectors and half-planes, and is regular at multiple roots, where the dᵢ between
     them are at their bound 0; p² ≥ 4q has dependent gradients there. d₁ = 0 puts a root on the line Re s = γ.
+
+    Args:
+        line: whether γ is a variable, the abscissa; otherwise γ = 0.
     """
     cases, first = build.covered_cases, build.size[0]
     gamma = build.variable("abscissa", upper=0.0) if line else 0.0
@@ -241,7 +251,7 @@ def lift_radius(build: ProgramBuilder, directions: Sequence[int]) -> AddedVariab
 
 
 def lift_quantity(build: ProgramBuilder, name: str, case: int, ends: tuple[float, float]) -> tuple[Any, AddedVariable]:
-    """A derived quantity as a variable, to be fixed by its division-free equation."""
+    """A variable for a derived quantity; the caller adds the equation without division that defines it."""
     symbol = build.variable(name if case == 0 else f"{name}.{case}", *ends)
     return symbol, AddedVariable(name, 1, lambda values, z: [[_finite(values[case][name])]])
 
@@ -250,11 +260,11 @@ def worst_guess(
     sign: float, expression: Expression, cases: Sequence[int], values: Sequence[Values], z: Sequence[Any]
 ) -> list[list[float]]:
     """The worst finite value over the cases."""
-    found = [sign * float(expression(values[k])) for k in cases]
-    return [[max((v for v in found if np.isfinite(v)), default=0.0)]]
+    case_values = [sign * float(expression(values[k])) for k in cases]
+    return [[max((v for v in case_values if np.isfinite(v)), default=0.0)]]
 
 
-_DOUBLE = 1e-3  # real roots closer than this, relative to the largest root, may be one double root
+_DOUBLE = 1e-3  # two real roots with a smaller distance, relative to the largest root, may be one double root
 
 
 def _pair_distance(at: int, x: Array) -> float:
@@ -263,10 +273,10 @@ def _pair_distance(at: int, x: Array) -> float:
 
 
 def _real_distance(at: int, x: Array) -> float:
-    """Distance from the line to the nearer of two real roots; for a complex pair, plus its imaginary part."""
+    """Distance from the line to the nearer real root; for a complex pair, its distance plus its imaginary part."""
     half, kappa = x[at] / 2, x[at + 1]
-    rest = float(np.sqrt(abs(half * half - kappa)))
-    return float(half + rest if half * half < kappa else kappa / (half + rest or 1.0))
+    offset = float(np.sqrt(abs(half * half - kappa)))
+    return float(half + offset if half * half < kappa else kappa / (half + offset or 1.0))
 
 
 def _step_distance(at: int, x: Array) -> float:
@@ -275,7 +285,7 @@ def _step_distance(at: int, x: Array) -> float:
 
 
 def _sector_distance(at: int, x: Array) -> float:
-    """Damping ratio of a pair; the pair with the smallest one is on the edge."""
+    """Damping ratio of a pair; the pair with the smallest ratio is on the edge."""
     p, w = x[at], x[at + 1]
     return float(p / (2 * w)) if w > 0 else np.inf
 
@@ -291,9 +301,9 @@ def _finite(value: Any) -> float:
 
 
 def pair_roots(z: Roots) -> list[Roots]:
-    """Roots two by two: conjugates together, nearly equal real ones together, then real neighbours.
+    """Roots in pairs: conjugate roots, nearly equal real roots, then neighbouring real roots.
 
-    For an odd number, one real root comes last and alone: the leftmost that is not nearly equal to another.
+    If the number of roots is odd, a single real root comes last: the leftmost that is not nearly equal to another.
     """
     pairs, real = [z[k : k + 2] for k in range(0, len(z) - 1, 2) if z[k].imag], np.sort(z[z.imag == 0].real)
     alone = real[:0]
@@ -312,9 +322,9 @@ def pair_roots(z: Roots) -> list[Roots]:
 
 
 def factors_of(z: Roots, gamma: float, lead: float = 1.0) -> list[float]:
-    """β and κ of the factors about the line Re s = γ; δ of a linear one.
+    """β and κ of each quadratic factor in t = s − γ, then δ of the linear factor, if there is one.
 
-    A `lead` other than 1 scales the linear factor, or else the first one, which then has the largest roots.
+    A `lead` other than 1 scales the linear factor, or without one the first factor, which then has the largest roots.
     """
     pairs = [pair - gamma for pair in pair_roots(z)]
     if lead != 1.0:
@@ -354,18 +364,18 @@ def _guess_factors(
 
 
 def _real_guess(cases: Sequence[int], line: bool, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """Real roots at the real parts of the design's roots, but left of 0."""
-    every = np.concatenate([z[case] for case in cases])
-    gamma = min(float(every.real.max()) + 0.05 * float(np.abs(every).mean()) + 1e-3, -1e-3) if line else 0.0
+    """Real roots at the real parts of the roots of the design, but left of 0."""
+    roots = np.concatenate([z[case] for case in cases])
+    gamma = min(float(roots.real.max()) + 0.05 * float(np.abs(roots).mean()) + 1e-3, -1e-3) if line else 0.0
     steps = [np.diff(np.sort(np.maximum(gamma - z[case].real, 1e-3)), prepend=0.0) for case in cases]
     return [[*([gamma] if line else []), *(float(d) for part in steps for d in part)]]
 
 
 def _positive_guess(case: int, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """The rightmost real root, or the root nearest to one, and the polynomial of the others."""
+    """The rightmost real root, or the root that is nearest to one, and the polynomial of the other roots."""
     first = int(np.argmax(z[case].real - 2 * np.abs(z[case].imag)))
-    rest = np.atleast_1d(np.poly(np.delete(z[case], first))).real
-    return [[max(float(z[case][first].real), 0.0), *map(float, rest[1:])]]
+    quotient = np.atleast_1d(np.poly(np.delete(z[case], first))).real
+    return [[max(float(z[case][first].real), 0.0), *map(float, quotient[1:])]]
 
 
 def _radius_guess(directions: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array
 
-_STEEP = 7.0  # the inner half of the scale near 0 covers 3 % of a range, its inner tenth 2e-3
-_DECADES = 100.0  # ratio of the ends of a range above which its scale is logarithmic
+_STEEP = 7.0  # c of the scale near 0: its inner half covers 3 % of a range, its inner tenth 2e-3 of it
+_DECADES = 100.0  # if the ratio of the ends of a range is larger, its scale is logarithmic
 
 
 @dataclass(frozen=True)
 class UnitBox:
-    """The box of a problem as a unit cube; angles scale by their tangent, ranges over decades by their logarithm."""
+    """The box of a problem as a unit cube: angles scale by their tangent, ranges over decades by their logarithm."""
 
     problem: Posed
 
@@ -31,16 +31,16 @@ class UnitBox:
         place = np.moveaxis(u, -1, 0)
         plain = [back(row) for (_, back), row in zip(self._scales, first + width * place, strict=True)]
         x = np.minimum(np.maximum(np.stack(plain), lower), upper)
-        x = np.where(place <= 0, lower, np.where(place >= 1, upper, x))  # to the last digit
+        x = np.where(place <= 0, lower, np.where(place >= 1, upper, x))  # exactly, without rounding
         return dict(zip(self.problem.free, x, strict=True))
 
     def points(self, designs: Mapping[str, float]) -> Array:
         """The point of one design."""
-        found = []
+        coordinates = []
         for (name, ends), (stretch, _) in zip(self.problem.free.items(), self._scales, strict=True):
             lower, upper, x = stretch(np.array([*ends, designs[name]]))
-            found.append((x - lower) / (upper - lower))
-        return np.asarray(np.clip(found, 0.0, 1.0))
+            coordinates.append((x - lower) / (upper - lower))
+        return np.asarray(np.clip(coordinates, 0.0, 1.0))
 
     def even_near_zero(self, u: Array) -> tuple[Array, Array]:
         """Move points to a scale that resolves values near 0, and return the slopes of that map.

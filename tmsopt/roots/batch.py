@@ -1,4 +1,4 @@
-"""Classes and motion of many polynomials of one degree: quartics by closed formulas, others by numeric roots."""
+"""Finds classes and motion of many polynomials of one degree: quartics by closed formulas, others by numeric roots."""
 
 from collections.abc import Sequence
 

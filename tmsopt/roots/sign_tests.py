@@ -1,7 +1,7 @@
-"""Functions of the coefficients that change sign where two roots coincide, or where two roots add up to 0.
+"""Computes functions of the coefficients that change sign where two roots coincide, or where two roots add up to 0.
 
-Above degree 4 they come from numeric roots, and do not depend on the unit of the roots: the sign is the sign of the
-discriminant ∏ (zⱼ − zₖ)² or of Orlando's product ∏ (zⱼ + zₖ), the size is the relative size of its smallest factor,
+Above degree 4 they are computed from numeric roots, and do not depend on the unit of the roots. The sign is the sign of
+the discriminant ∏ (zⱼ − zₖ)² or of Orlando's product ∏ (zⱼ + zₖ). The size is the relative size of the smallest factor,
 because the size of a product of many factors has no meaning.
 """
 
@@ -54,7 +54,7 @@ def weave_test(coefficients: Coefficients) -> Any:
 
 
 def nearest_pair_mean(coefficients: Coefficients) -> Array:
-    """Mean real part of the two roots nearest to each other; for a double root as exact as the coefficients."""
+    """Mean real part of the two roots nearest to each other; for a double root, as exact as the coefficients."""
     if len(coefficients) == 3:
         return np.asarray(-coefficients[1] / 2 / coefficients[0], dtype=float)
     z = roots(np.stack(np.broadcast_arrays(*coefficients), axis=-1))

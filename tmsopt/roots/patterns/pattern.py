@@ -23,7 +23,7 @@ Roots = NDArray[np.complex128]
 _NAME = "<U32"
 
 _UNRELATED = tuple(p**0.5 for p in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37))
-"""Values of the unknowns without rational relations, to recognise equal factors."""
+"""Values of the unknowns without rational relations. For these values only identical factors are equal."""
 
 
 @dataclass(frozen=True)

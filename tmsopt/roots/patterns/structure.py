@@ -20,9 +20,9 @@ ROUNDING = 8 * np.finfo(float).eps
 HIGHEST = 12
 """Highest degree of a polynomial whose structure can be decided."""
 
-_BOUNDARY = 1e-10  # of the squared root size: a pattern contains its boundary, as CEP2 and 2EP2 contain EP4
+_BOUNDARY = 1e-10  # relative to the squared size of the roots: a pattern contains its boundary, as CEP2 contains EP4
 _LARGEST_EXPONENT = 1023  # of 2 in a double
-_ZERO = np.finfo(float).eps ** 2  # of the largest root: real parts below it are rounding errors of a fit in doubles
+_ZERO = np.finfo(float).eps ** 2  # smaller real parts, relative to the largest root, are rounding errors of a fit
 
 
 @dataclass(frozen=True)
@@ -187,12 +187,12 @@ def _make_structure(fit: Fit, numeric: Roots, unit: float) -> Structure:
     if not fit.shape.groups:
         return Structure("pair" if numeric[np.argmax(numeric.real)].imag else "real", _simple_roots(numeric), 0.0)
     upper = [(z * unit, group.multiplicity) for z, group in zip(fit.places, fit.shape.groups, strict=True)]
-    upper += [(z * unit, 1) for z in (numeric_roots(fit.rest) if fit.shape.rest else ()) if z.imag >= 0]
+    upper += [(z * unit, 1) for z in (numeric_roots(fit.rest_factor) if fit.shape.rest_degree else ()) if z.imag >= 0]
     right = max(z.real for z, _ in upper)
     line = [Group(multiplicity, z.imag == 0) for z, multiplicity in upper if z.real == right]
     least = _ZERO * max(abs(z) for z, _ in upper)
-    every = ((w, m) for z, m in upper for w in ((z, z.conjugate()) if z.imag else (z,)))
-    roots = [Root(float(w.real) if abs(w.real) > least else 0.0, float(w.imag), m) for w, m in every]
+    all_roots = ((w, m) for z, m in upper for w in ((z, z.conjugate()) if z.imag else (z,)))
+    roots = [Root(float(w.real) if abs(w.real) > least else 0.0, float(w.imag), m) for w, m in all_roots]
     two_double = [(root.im, root.multiplicity) for root in roots] == [(0.0, 2), (0.0, 2)]
     return Structure("2EP2" if two_double else _name_line(line), rightmost_first(roots), fit.distance)
 
