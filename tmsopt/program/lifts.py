@@ -9,7 +9,7 @@ import numpy as np
 
 from tmsopt.models import Values
 from tmsopt.models.expression import Expression
-from tmsopt.program.nlp import AddedVariable, Contact, Factor
+from tmsopt.program.nlp import AddedVariable, Contact, Factor, Scale
 from tmsopt.records import Array
 from tmsopt.roots import product, shift
 from tmsopt.roots.patterns.pattern import Roots
@@ -35,16 +35,12 @@ class ProgramBuilder(Protocol):
         """Numbers of the cases over which a root quantity takes its worst value."""
 
     @property
-    def unit(self) -> float:
-        """The NLP's unit of the roots."""
+    def scale(self) -> Scale:
+        """The units of the NLP for the roots and for a0."""
 
     @property
     def lead(self) -> int:
         """Sign of a0 in an NLP whose feasible set includes a0 = 0; 0 otherwise."""
-
-    @property
-    def leading_unit(self) -> float:
-        """The NLP's unit of a0."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -122,7 +118,7 @@ def _lift_by_factors(
                 contacts.append(Contact(partial(_step_distance, at), variable=at))
         build.equal(name, shift(a, edge) if is_shifted else a, [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
-    scale = abs(lead) / build.leading_unit
+    scale = abs(lead) / build.scale.lead
     guesses = (
         partial(_guess_factors, build.covered_cases, scale, is_shifted, squared, partial(place, is_near))
         for is_near in (False, True)
@@ -152,7 +148,9 @@ def lift_abscissa(build: ProgramBuilder) -> LiftedQuantity:
         return right + (min(step, 0.1 * abs(right)) + 1e-6 if is_near else step + 1e-3)
 
     bounds = (-np.inf, np.inf)
-    return _lift_by_factors(build, "abscissa", bounds, quadratic, place, build.unit, ("delta", 0.0), is_shifted=True)
+    return _lift_by_factors(
+        build, "abscissa", bounds, quadratic, place, build.scale.unit, ("delta", 0.0), is_shifted=True
+    )
 
 
 def lift_damping_ratio(build: ProgramBuilder) -> LiftedQuantity:
@@ -198,7 +196,9 @@ def lift_angular_frequency(build: ProgramBuilder) -> LiftedQuantity:
         return float(np.abs(z.imag).max()) + (1e-6 if is_near else 0.05 * size + 1e-3)
 
     bounds, linear = (0.0, np.inf), ("d", -np.inf)
-    return _lift_by_factors(build, "angular_frequency", bounds, quadratic, place, build.unit, linear, all_real=0.0)
+    return _lift_by_factors(
+        build, "angular_frequency", bounds, quadratic, place, build.scale.unit, linear, all_real=0.0
+    )
 
 
 def lift_positive_root(build: ProgramBuilder) -> AddedVariable:
@@ -230,7 +230,7 @@ def lift_real_roots(build: ProgramBuilder, line: bool) -> LiftedQuantity:
         distances = [sum(steps[:k], 0) for k in range(1, len(a))]
         build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, d] for d in distances))])
     lift = AddedVariable("abscissa", build.size[0] - first, partial(_real_guess, cases, line))
-    return LiftedQuantity(build.unit * gamma, lift, tuple(contacts), ())
+    return LiftedQuantity(build.scale.unit * gamma, lift, tuple(contacts), ())
 
 
 def lift_radius(build: ProgramBuilder, directions: Sequence[int]) -> AddedVariable:

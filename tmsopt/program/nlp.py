@@ -330,10 +330,7 @@ class Scale:
 
     def scale_coefficients(self, coefficients: Sequence[Any]) -> list[Any]:
         """Descending coefficients of the polynomial in s/unit, over the unit of the leading one."""
-        if self == Scale():
-            return list(coefficients)
-        n = len(coefficients) - 1
-        return [c / (self.lead * self.unit**k) for k, c in zip(range(n + 1), coefficients, strict=True)]
+        return [c / (self.lead * self.unit**k) for k, c in enumerate(coefficients)]
 
 
 def scale_of(problem: Posed) -> Scale:
