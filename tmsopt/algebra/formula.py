@@ -292,9 +292,9 @@ def _as_number(x: Node) -> Node:
 
 
 def _power(a: Fraction, b: Fraction) -> Fraction | None:
-    exact = b.denominator == 1 and abs(b) <= _LARGEST_POWER and (a != 0 or b > 0)
+    is_computed = b.denominator == 1 and abs(b) <= _LARGEST_POWER and (a != 0 or b > 0)
     bits = max(a.numerator.bit_length(), a.denominator.bit_length())
-    return a ** int(b) if exact and bits * abs(b) <= _LARGEST_BITS else None
+    return a ** int(b) if is_computed and bits * abs(b) <= _LARGEST_BITS else None
 
 
 _EXACT: Mapping[str, Callable[..., Fraction | None]] = {

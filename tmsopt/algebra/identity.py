@@ -52,8 +52,8 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
 
     def __add__(self, other: Any) -> "Quotient":
         o = self._convert(other)
-        crossed = _multiply(self.numerator, o.denominator) + _multiply(o.numerator, self.denominator)
-        return Quotient(crossed, _multiply(self.denominator, o.denominator))
+        cross_sum = _multiply(self.numerator, o.denominator) + _multiply(o.numerator, self.denominator)
+        return Quotient(cross_sum, _multiply(self.denominator, o.denominator))
 
     def __mul__(self, other: Any) -> "Quotient":
         o = self._convert(other)
@@ -214,5 +214,7 @@ def is_linear(formula: Formula) -> bool:
     """Whether a formula of one output is linear in its inputs. True is certain; False is not."""
     field = Field(formula)
     (output,) = fold(formula, field.inputs, field.kind)
-    plain = (sum(exponents) == sum(exponents[: len(formula.names)]) <= 1 for exponents in output.numerator.to_dict())
-    return bool(output.denominator.is_constant()) and all(plain)
+    terms_are_linear = (
+        sum(exponents) == sum(exponents[: len(formula.names)]) <= 1 for exponents in output.numerator.to_dict()
+    )
+    return bool(output.denominator.is_constant()) and all(terms_are_linear)

@@ -51,9 +51,9 @@ def bound_roots(coefficients: Sequence[Interval]) -> float:
     """
     with flint.ctx.workprec(_PRECISION):
         a = [ball(ends) for ends in coefficients]
-        least = abs(a[0]).lower()
-        if not (a[0].is_finite() and least > 0):
+        min_lead = abs(a[0]).lower()
+        if not (a[0].is_finite() and min_lead > 0):
             return math.inf
         n = len(a) - 1
-        terms = [(abs(c).upper() / least / (2 if k == n else 1)).root(k) for k, c in enumerate(a[1:], start=1)]
+        terms = [(abs(c).upper() / min_lead / (2 if k == n else 1)).root(k) for k, c in enumerate(a[1:], start=1)]
         return max(interval(2 * t)[1] for t in terms)

@@ -41,9 +41,9 @@ class Enclosure:
     uniqueness: float
 
 
-def jacobian(system: System, at: Mapping[str, Any], names: Sequence[str]) -> Any:
+def jacobian(system: System, point: Mapping[str, Any], names: Sequence[str]) -> Any:
     """Jacobian of a system with respect to some of its names, one column for each, by first-order series."""
-    columns = [system({**at, n: flint.arb_series([at[n], 1], prec=2)}) for n in names]
+    columns = [system({**point, n: flint.arb_series([point[n], 1], prec=2)}) for n in names]
     rows = zip(*columns, strict=True)
     return flint.arb_mat([[v[1] if isinstance(v, flint.arb_series) else flint.arb(0) for v in row] for row in rows])
 
@@ -60,17 +60,17 @@ def refine_solution(
     Raises:
         ProofFailed: if Newton's method does not converge.
     """
-    at = dict(start)
+    point = dict(start)
     tolerance = flint.arb(10) ** -digits
     for _ in range(_STEPS):
-        step = _solve_linear(jacobian(system, at, names), flint.arb_mat([[r.mid()] for r in system(at)]))
-        sizes = [(abs(step[k, 0]).mid() / (units.get(n, 1) + abs(at[n]))).mid() for k, n in enumerate(names)]
+        step = _solve_linear(jacobian(system, point, names), flint.arb_mat([[r.mid()] for r in system(point)]))
+        sizes = [(abs(step[k, 0]).mid() / (units.get(n, 1) + abs(point[n]))).mid() for k, n in enumerate(names)]
         for k, n in enumerate(names):
-            at[n] = (at[n] - step[k, 0]).mid()
-        if not all(at[n].is_finite() for n in names):
+            point[n] = (point[n] - step[k, 0]).mid()
+        if not all(point[n].is_finite() for n in names):
             break
         if all(s < tolerance for s in sizes):
-            return at
+            return point
     raise ProofFailed(
         "Newton's method finds no solution near the design: the equations are singular there, or it is no solution"
     )

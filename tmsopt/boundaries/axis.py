@@ -79,11 +79,11 @@ def find_longest_chain(problem: Posed, parameters: Numbers) -> int | None:
         return None
     zeros = next(k for k, c in enumerate(a[::-1]) if c != 0)
     ascending = a[::-1][zeros:]
-    shared = flint.fmpq_poly(ascending[::2]).gcd(flint.fmpq_poly(ascending[1::2]))
-    squares: Any = (shared * shared.denom()).numer().complex_roots()
-    if zeros + shared.degree() < 1 or any(square[0].imag != 0 or square[0].real > 0 for square in squares):
+    divisor = flint.fmpq_poly(ascending[::2]).gcd(flint.fmpq_poly(ascending[1::2]))
+    squares: Any = (divisor * divisor.denom()).numer().complex_roots()
+    if zeros + divisor.degree() < 1 or any(square[0].imag != 0 or square[0].real > 0 for square in squares):
         return None
-    double = flint.fmpq_poly([c for x in shared.coeffs() for c in (x, flint.fmpq(0))])
+    double = flint.fmpq_poly([c for x in divisor.coeffs() for c in (x, flint.fmpq(0))])
     cofactor = (flint.fmpq_poly(ascending) / double).coeffs()[::-1]
     if not all(q > 0 for q in lienard_chipart([c / cofactor[0] for c in cofactor])):
         return None
@@ -112,12 +112,12 @@ def convert_as_typed(problem: Posed, parameters: Numbers) -> ExactDesign:
 def _classify_axis_roots(roots: Sequence[Root], errors: Array) -> tuple[str, ...] | None:
     """Boundaries of the roots on the axis, up to errors of the coefficients; None if a root is right of the axis."""
     z = np.array([complex(r.re, r.im) for r in roots for _ in range(r.multiplicity)])
-    near = np.abs(z.real) <= _ON_LINE * np.abs(z).max(initial=0.0)
-    on_line = np.where(near, 1j * z.imag, z)
+    is_on_axis = np.abs(z.real) <= _ON_LINE * np.abs(z).max(initial=0.0)
+    on_line = np.where(is_on_axis, 1j * z.imag, z)
     change = np.abs(rebuilt(on_line) - rebuilt(z))
     if len(z) != len(errors) - 1 or np.any(change > errors + _ROUNDING * rebuilt(-np.abs(z).astype(complex))):
-        near[:] = False
-    if np.any(z.real[~near] >= 0):
+        is_on_axis[:] = False
+    if np.any(z.real[~is_on_axis] >= 0):
         return None
-    kinds = {"weave": near & (z.imag != 0), "capsize": near & (z.imag == 0)}
+    kinds = {"weave": is_on_axis & (z.imag != 0), "capsize": is_on_axis & (z.imag == 0)}
     return tuple(kind for kind, mask in kinds.items() if mask.any())

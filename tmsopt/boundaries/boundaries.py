@@ -190,8 +190,8 @@ def measure_terms(c: Array) -> Array:
     """Size of the terms whose sum is each coefficient; a root at 0 counts as a thousandth of the median root."""
     lead = replace_small_lead(c)
     radius = np.abs(roots(lead))
-    least = _SMALL * (float(np.median(radius)) or 1.0)  # 1 if all are 0
-    return np.asarray(abs(lead[0]) * rebuilt(-np.maximum(radius, least).astype(complex)))
+    min_size = _SMALL * (float(np.median(radius)) or 1.0)  # 1 if all are 0
+    return np.asarray(abs(lead[0]) * rebuilt(-np.maximum(radius, min_size).astype(complex)))
 
 
 def divide_nearly(c: Array, factor: Array, size: Array) -> Array:

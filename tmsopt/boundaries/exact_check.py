@@ -53,11 +53,11 @@ def is_boundary(base: WeightedDesign, u: Array, heavy: bool) -> bool:
 def _find_changes_nearby(base: WeightedDesign, u: Array, heavy: bool, own_verdict: bool) -> Iterator[Array]:
     """Displacements near u at which the test in doubles differs from the verdict for the design itself."""
     size = float(np.linalg.norm(u))
-    around = np.concatenate([[u / size, -u / size], list_directions(base)])
+    rays = np.concatenate([[u / size, -u / size], list_directions(base)])
     for reach in _REACHES:
-        points = np.clip(u + max(reach * size, _MIN_RADIUS) * around, base.lower, base.upper)
-        at = base.coefficients(points)
-        verdict = is_heavily_damped(np.sign(at[:, :1]) * at) if heavy else is_stable(at, exact=False)
+        points = np.clip(u + max(reach * size, _MIN_RADIUS) * rays, base.lower, base.upper)
+        c = base.coefficients(points)
+        verdict = is_heavily_damped(np.sign(c[:, :1]) * c) if heavy else is_stable(c, exact=False)
         yield from points[np.flatnonzero(verdict != own_verdict)[:_MAX_TESTS]]
     if not heavy and not own_verdict:  # towards a corner with a multiple root, stable designs are few
         yield from (
@@ -93,5 +93,5 @@ def _has_negative_real_roots(problem: Posed, parameters: Numbers) -> bool:
 
 
 def _balls(problem: Posed, parameters: Numbers) -> list[flint.arb]:
-    at = {n: flint.arb(float(x)) for n, x in parameters.items()}
-    return [flint.arb(c) for c in problem.model.coefficients(at, problem.parameter_set)]
+    balls = {n: flint.arb(float(x)) for n, x in parameters.items()}
+    return [flint.arb(c) for c in problem.model.coefficients(balls, problem.parameter_set)]

@@ -287,8 +287,10 @@ def _nearest(base: WeightedDesign, crossings: list[RayCrossing], kind: str, meth
         return Nearest(kind)
     direct = not find_crossings_on_segment(base, best.u, heavy)
     direction = Table(dict(zip(base.weights, best.u.tolist(), strict=True)))
-    reached = {n: 0.0 if abs(x) <= _NOTHING * base.weights.get(n, 0.0) else x for n, x in base.design(best.u).items()}
-    return Nearest(kind, best.distance, Table(reached), direction, best.refined, direct)
+    parameters = {
+        n: 0.0 if abs(x) <= _NOTHING * base.weights.get(n, 0.0) else x for n, x in base.design(best.u).items()
+    }
+    return Nearest(kind, best.distance, Table(parameters), direction, best.refined, direct)
 
 
 def _find_nearest_on_edge(

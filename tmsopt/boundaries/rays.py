@@ -64,9 +64,9 @@ def find_crossings(base: WeightedDesign, rays: Array, t: Array, with_damping: bo
     c = base.coefficients(base.clip_rays(rays[:, None, :], t))
     crossings: list[RayCrossing] = []
     for heavy, test in ((False, _stable), (True, is_heavily_damped))[: 1 + with_damping]:
-        inside = test(c)
-        ray, step = np.nonzero(inside[:, 1:] != inside[:, :-1])
-        brackets = _Bracket(base, test, rays[ray], t[step], t[step + 1], inside[ray, step]).narrow(*_COARSE)
+        is_inside = test(c)
+        ray, step = np.nonzero(is_inside[:, 1:] != is_inside[:, :-1])
+        brackets = _Bracket(base, test, rays[ray], t[step], t[step + 1], is_inside[ray, step]).narrow(*_COARSE)
         names = [find_crossed_edges(c, heavy) for c in brackets.sides()[0]]
         distance = np.linalg.norm(base.clip_rays(brackets.rays, brackets.high), axis=1)
         for name in sorted({n for each in names for n in each}):
@@ -79,8 +79,8 @@ def list_directions(base: WeightedDesign) -> Array:
     """Unit vectors along ± each axis, along ± the gradient of each edge function, and in random directions."""
     axes = np.eye(len(base.lower))
     random = np.random.default_rng(0).standard_normal((_DIRECTIONS if len(axes) > 1 else 0, len(axes)))
-    near = base.coefficients(_STEP * np.concatenate([axes, -axes]))
-    slopes = (_edge_functions(near[: len(axes)]) - _edge_functions(near[len(axes) :])).T
+    coefficients = base.coefficients(_STEP * np.concatenate([axes, -axes]))
+    slopes = (_edge_functions(coefficients[: len(axes)]) - _edge_functions(coefficients[len(axes) :])).T
     slopes = slopes[np.all(np.isfinite(slopes), axis=1) & np.any(slopes != 0, axis=1)]
     largest = np.abs(slopes).max(axis=1, keepdims=True, initial=0.0)
     slopes = np.ldexp(slopes, -np.frexp(largest)[1])  # so that squares do not overflow
@@ -158,8 +158,8 @@ class _Bracket:
         rays = np.arange(len(low))
         for _ in range(rounds):
             t = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, parts + 1)
-            changed = self.test(self.coefficients(t[:, 1:-1])) != self.inside[:, None]
-            first = np.where(changed.any(axis=1), changed.argmax(axis=1) + 1, parts)
+            has_changed = self.test(self.coefficients(t[:, 1:-1])) != self.inside[:, None]
+            first = np.where(has_changed.any(axis=1), has_changed.argmax(axis=1) + 1, parts)
             low, high = t[rays, first - 1], t[rays, first]
         return replace(self, low=low, high=high)
 

@@ -41,13 +41,13 @@ class WeightedDesign:
 
     def design(self, u: Array) -> dict[str, float]:
         """The parameters at a displacement, inside their ranges; a displacement to an end gives exactly the end."""
-        at = self.displace(u)
+        parameters = self.displace(u)
         for k, n in enumerate(self.weights):
             r = self.problem.parameter_set[n].range
-            at[n] = min(max(float(at[n]), r.lower), r.upper)
-            at[n] = r.lower if u[k] <= self.lower[k] and r.closed else at[n]
-            at[n] = r.upper if u[k] >= self.upper[k] and r.closed else at[n]
-        return at
+            parameters[n] = min(max(float(parameters[n]), r.lower), r.upper)
+            parameters[n] = r.lower if u[k] <= self.lower[k] and r.closed else parameters[n]
+            parameters[n] = r.upper if u[k] >= self.upper[k] and r.closed else parameters[n]
+        return parameters
 
     @cached_property
     def lower(self) -> Array:
@@ -64,9 +64,9 @@ class WeightedDesign:
         """Displacements to both ends of each range; if a range excludes its end, to a value slightly inside."""
         displacements = []
         for n, weight in self.weights.items():
-            allowed, value = self.problem.parameter_set[n].range, self.parameters[n]
-            inset = 0.0 if allowed.closed else _OPEN * abs(value)
-            ends = (allowed.lower + inset - value) / weight, (allowed.upper - inset - value) / weight
+            physical_range, value = self.problem.parameter_set[n].range, self.parameters[n]
+            inset = 0.0 if physical_range.closed else _OPEN * abs(value)
+            ends = (physical_range.lower + inset - value) / weight, (physical_range.upper - inset - value) / weight
             displacements.append((min(ends[0], 0.0), max(ends[1], 0.0)))
         return np.array(displacements)
 
@@ -154,8 +154,8 @@ def default_weights(problem: Posed, parameters: Numbers) -> dict[str, float]:
     widths = {n: high - low for n, (low, high) in problem.free.items()}
     sizes = {n: abs(x) if abs(x) > _NOTHING * widths.get(n, 0.0) else 0.0 for n, x in parameters.items()}
     for p in (p for p in parameter_set.parameters if p.may_change(sizes[p.name])):
-        alike = [sizes[q.name] for q in parameter_set.parameters if q.unit == p.unit and p.unit not in ("1", "rad")]
-        weights[p.name] = sizes[p.name] or max(alike, default=0.0) or 1.0
+        peers = [sizes[q.name] for q in parameter_set.parameters if q.unit == p.unit and p.unit not in ("1", "rad")]
+        weights[p.name] = sizes[p.name] or max(peers, default=0.0) or 1.0
     return weights
 
 

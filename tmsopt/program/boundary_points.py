@@ -52,9 +52,9 @@ def lift_displacements(weights: Mapping[str, float], points: Displacements) -> A
 
 
 def _measure_displacement(
-    weights: Mapping[str, float], names: Sequence[str], nominal: Values, at: Values
+    weights: Mapping[str, float], names: Sequence[str], nominal: Values, displaced: Values
 ) -> list[float]:
-    return [float(at[n] - nominal[n]) / weight_of(n, float(nominal[n]), weights) for n in names]
+    return [float(displaced[n] - nominal[n]) / weight_of(n, float(nominal[n]), weights) for n in names]
 
 
 def lift_boundary_points(
@@ -111,8 +111,8 @@ def _guess_unknowns(
     for point in points:
         w = [_axis_pair_size(z[point.case])] if point.has_frequency else []
         u = _measure_displacement(weights, point.names, values[0], values[point.case])
-        at = {**numeric_inputs(values[0]), **dict(zip(point.unknowns, [*u, *w], strict=True))}
-        slopes = np.array(fold(point.slopes, at, FLOATS), dtype=float).reshape(point.equations, -1)
+        inputs = {**numeric_inputs(values[0]), **dict(zip(point.unknowns, [*u, *w], strict=True))}
+        slopes = np.array(fold(point.slopes, inputs, FLOATS), dtype=float).reshape(point.equations, -1)
         multipliers = np.linalg.lstsq(slopes.T, -np.array([*u, *[0.0] * len(w)]), rcond=None)[0]
         guesses += [*w, *multipliers.tolist()]
     return [guesses]

@@ -36,8 +36,8 @@ class DesignScores:
     @property
     def excess(self) -> Array:
         """Violation of each limit, ≥ 0; inf for a limit whose value is not a number."""
-        equal = self.equal.reshape(-1, *[1] * (self.beyond.ndim - 1))
-        amount = np.where(equal, np.abs(self.beyond), np.maximum(self.beyond, 0.0))
+        is_equality = self.equal.reshape(-1, *[1] * (self.beyond.ndim - 1))
+        amount = np.where(is_equality, np.abs(self.beyond), np.maximum(self.beyond, 0.0))
         return np.where(np.isnan(amount), np.inf, amount)
 
 
@@ -49,25 +49,25 @@ def score_designs(problem: Posed, columns: Mapping[str, Array]) -> DesignScores:
     """
     shape = next(iter(columns.values())).shape
     nominal = problem.ordered(columns)
-    listed = [case.applied(nominal) for case in problem.cases if not case.direction]
-    varied = nominal
-    if listed:  # all cases are computed together, since small arrays cost as much as large ones
-        varied_names = {n for p in listed for n in p if p[n] is not nominal[n]}
-        varied = nominal | {n: _stack_cases([p[n] for p in listed], len(shape)) for n in varied_names}
-    shape_of_cases = (len(listed) or 1, *shape)
+    cases = [case.applied(nominal) for case in problem.cases if not case.direction]
+    parameters = nominal
+    if cases:  # all cases are computed together, since small arrays cost as much as large ones
+        varied_names = {n for p in cases for n in p if p[n] is not nominal[n]}
+        parameters = nominal | {n: _stack_cases([p[n] for p in cases], len(shape)) for n in varied_names}
+    shape_of_cases = (len(cases) or 1, *shape)
     conditions = list(problem.conditions.values())
     expressions = [e for e in (problem.objective, *conditions) if e]
-    a, names = coefficients_of(problem, varied), {n for e in expressions for n in e.names}
+    a, names = coefficients_of(problem, parameters), {n for e in expressions for n in e.names}
     # As in the recheck, all coefficients must be finite and the mass matrix nonsingular.
     has_dynamics = np.broadcast_to(reduce(np.logical_and, map(np.isfinite, a), a[0] != 0), shape_of_cases)
     worst = {}
     for name, x in roots_of(a, {*names, "abscissa"} if _RATIO in names else names).items():
         sign = WORSE_DIRECTION[name]
         worst[name] = sign * np.broadcast_to(sign * x, shape_of_cases).max(axis=0)
-    values = dict(zip(expressions, evaluate(problem, expressions, varied | worst), strict=True))
-    equal = [c for c in conditions if c.equality]
-    if listed and equal:  # an equality is required of the nominal design only
-        values |= zip(equal, evaluate(problem, equal, nominal | worst), strict=True)
+    values = dict(zip(expressions, evaluate(problem, expressions, parameters | worst), strict=True))
+    equalities = [c for c in conditions if c.equality]
+    if cases and equalities:  # an equality is required of the nominal design only
+        values |= zip(equalities, evaluate(problem, equalities, nominal | worst), strict=True)
 
     def grade(e: Expression, sign: float) -> Array:
         return np.asarray(np.where(has_dynamics, _grade(e, sign, values[e], worst), np.nan).max(axis=0))
@@ -87,8 +87,8 @@ def _grade(expression: Expression, sign: float, value: Array, worst: Mapping[str
     grade = sign * value
     if expression.names != (_RATIO,) or expression.equality:
         return grade
-    at, above = (sign * float(expression({_RATIO: ratio})) for ratio in (-1.0, -0.9))
-    if above >= at or (expression.comparison and at <= 0):
+    lowest, next_lowest = (sign * float(expression({_RATIO: ratio})) for ratio in (-1.0, -0.9))
+    if next_lowest >= lowest or (expression.comparison and lowest <= 0):
         return grade
     return np.where(worst[_RATIO] <= -1, grade + worst["abscissa"], grade)
 

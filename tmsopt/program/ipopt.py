@@ -87,8 +87,8 @@ def make_ipopt(
             cases hold.
     """
     unit = (*nlp.units, *[1.0] * (len(nlp.variables) - len(nlp.units)))
-    chosen = (("ipopt.linear_solver", options.linear_solver), ("ipopt.max_iter", max_iterations))
-    solver = _SOLVERS.get(nlp.program, unit, 1 / nlp.objective_unit, (*chosen, *_SETTINGS[start].items()))
+    settings = (("ipopt.linear_solver", options.linear_solver), ("ipopt.max_iter", max_iterations))
+    solver = _SOLVERS.get(nlp.program, unit, 1 / nlp.objective_unit, (*settings, *_SETTINGS[start].items()))
 
     def run(x0: Array, limits: NLP = nlp) -> Run:
         lower, upper = np.array(limits.lower), np.array(limits.upper)
@@ -108,7 +108,7 @@ def make_ipopt(
 
 
 def _solver(
-    program: CompiledProgram, unit: tuple[float, ...], objective: float, chosen: tuple[tuple[str, Any], ...]
+    program: CompiledProgram, unit: tuple[float, ...], objective: float, user_settings: tuple[tuple[str, Any], ...]
 ) -> ca.Function:
     """IPOPT on a compiled program, with the variables in the given units."""
     settings: dict[str, Any] = {
@@ -121,7 +121,7 @@ def _solver(
         "ipopt.tol": 1e-12,
         "ipopt.bound_relax_factor": 0.0,
         "ipopt.obj_scaling_factor": objective,
-        **dict(chosen),
+        **dict(user_settings),
     }
     if set(unit) <= {1.0}:
         return ca.nlpsol("solver", "ipopt", program.function, {**settings, **program.derivatives})
@@ -183,17 +183,17 @@ def relaxation_gain(nlp: NLP, point: Point) -> Callable[[Sequence[int]], float]:
     lower, upper = np.array([*nlp.row_lower, *nlp.lower]), np.array([*nlp.row_upper, *nlp.upper])
     value = np.concatenate([rows.ravel(), point.x])
     signs = np.where(value - lower <= upper - value, -1.0, 1.0)  # of multipliers at a lower and at an upper limit
-    free = (lower == upper)[is_active]
+    is_equation = (lower == upper)[is_active]
 
     def gain(limits: Sequence[int]) -> float:
         if dependent:
             from scipy.optimize import linprog  # importing it takes 0.25 s
 
-            chosen = np.isin(np.arange(len(multipliers)), limits)[is_active] * signs[is_active]
-            lower_bounds = np.where(free | (signs[is_active] < 0), -np.inf, 0.0).tolist()
-            upper_bounds = np.where(free | (signs[is_active] > 0), np.inf, 0.0).tolist()
+            cost = np.isin(np.arange(len(multipliers)), limits)[is_active] * signs[is_active]
+            lower_bounds = np.where(is_equation | (signs[is_active] < 0), -np.inf, 0.0).tolist()
+            upper_bounds = np.where(is_equation | (signs[is_active] > 0), np.inf, 0.0).tolist()
             solution = linprog(
-                chosen, A_eq=columns, b_eq=-slope.ravel(), bounds=list(zip(lower_bounds, upper_bounds, strict=True))
+                cost, A_eq=columns, b_eq=-slope.ravel(), bounds=list(zip(lower_bounds, upper_bounds, strict=True))
             )
             if solution.success and solution.fun is not None:
                 return float(solution.fun)
@@ -279,8 +279,8 @@ def _polish(conditions: _Conditions, run: Run) -> Point:
 def _find_releasable(conditions: _Conditions, point: Point) -> NDArray[np.bool_]:
     """Rows that are held at a limit with a multiplier of the wrong sign, for example if two limits nearly coincide."""
     small = _STATIONARY * (1 + np.abs(point.row_multipliers).max(initial=0.0))
-    below = np.isinf(conditions.row_upper) & (point.row_multipliers > small)
-    return np.asarray(below | (np.isinf(conditions.row_lower) & (point.row_multipliers < -small)))
+    is_below = np.isinf(conditions.row_upper) & (point.row_multipliers > small)
+    return np.asarray(is_below | (np.isinf(conditions.row_lower) & (point.row_multipliers < -small)))
 
 
 def _newton(conditions: _Conditions, run: Run, loose: bool, released: NDArray[np.bool_] | bool = False) -> Point | None:
@@ -293,7 +293,7 @@ def _newton(conditions: _Conditions, run: Run, loose: bool, released: NDArray[np
     lower, upper = conditions.lower, conditions.upper
     at_lower, at_upper = _active(run.x, lower, upper, run.bound_multipliers, loose)
     x = np.where(at_lower, lower, np.where(at_upper, upper, run.x))
-    free = np.logical_not(np.logical_or(at_lower, at_upper))
+    is_free = np.logical_not(np.logical_or(at_lower, at_upper))
     g = conditions.evaluate(x, run.row_multipliers)[2]
     if not np.all(np.isfinite(g)):
         return None
@@ -301,21 +301,21 @@ def _newton(conditions: _Conditions, run: Run, loose: bool, released: NDArray[np
     active_rows = np.logical_or(low, high) & ~np.asarray(released)
     target = np.where(low, conditions.row_lower, conditions.row_upper)[active_rows]
     rows = np.where(active_rows, run.row_multipliers, 0.0)
-    n, m, last_size = int(free.sum()), int(active_rows.sum()), np.inf
+    n, m, last_size = int(is_free.sum()), int(active_rows.sum()), np.inf
     for _ in range(_STEPS):
         _, gradient, g, jacobian, hessian = conditions.evaluate(x, rows)
-        active = jacobian[np.ix_(active_rows, free)]
-        matrix = np.block([[hessian[np.ix_(free, free)], active.T], [active, np.zeros((m, m))]])
-        right = np.concatenate([-gradient[free], target - g[active_rows]])
+        active = jacobian[np.ix_(active_rows, is_free)]
+        matrix = np.block([[hessian[np.ix_(is_free, is_free)], active.T], [active, np.zeros((m, m))]])
+        right = np.concatenate([-gradient[is_free], target - g[active_rows]])
         if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(right))):
             return None
         scale = 1 / np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)
         solution = _solve_linear(matrix * scale[:, None], right * scale)
         x = x.copy()
-        x[free] += solution[:n]
+        x[is_free] += solution[:n]
         rows = np.zeros_like(rows)
         rows[active_rows] = solution[n:]
-        size = np.abs(solution[:n] / (1 + np.abs(x[free]))).max(initial=0.0)
+        size = np.abs(solution[:n] / (1 + np.abs(x[is_free]))).max(initial=0.0)
         if size <= _STALLED and size > last_size / 2:  # only rounding remains
             break
         last_size = size
@@ -323,7 +323,7 @@ def _newton(conditions: _Conditions, run: Run, loose: bool, released: NDArray[np
         return None
     x = np.clip(x, lower, upper)
     _, gradient, _, jacobian, _ = conditions.evaluate(x, rows)
-    return conditions.point(x, rows, np.where(free, 0.0, -(gradient + jacobian.T @ rows)))
+    return conditions.point(x, rows, np.where(is_free, 0.0, -(gradient + jacobian.T @ rows)))
 
 
 def _solve_linear(matrix: Array, right: Array) -> Array:

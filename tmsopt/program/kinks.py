@@ -34,17 +34,17 @@ def epigraph_form(nlp: NLP, two_sided: bool) -> NLP:
     Args:
         two_sided: whether root quantities need their contacts even without kinks.
     """
-    plain = nlp if two_sided else replace(nlp, contacts={})
+    smooth_nlp = nlp if two_sided else replace(nlp, contacts={})
     if not _may_have_kinks(nlp):
-        return plain
+        return smooth_nlp
     build = _EpigraphBuilder(nlp)
     f, g = build.expressions()
     if not build.kinks:
-        return plain
+        return smooth_nlp
     names = (*map(variable_name, range(len(nlp.variables) + len(build.kinks))), *nlp.numbers)
     count, first = len(build.kinks), len(nlp.rows)
     rows = sum(len(kink.rows) for kink in build.kinks)
-    plain = replace(
+    smooth_nlp = replace(
         nlp,
         variables=(*nlp.variables, *[KINK] * count),
         formula=formula([f, *g], names),
@@ -56,23 +56,23 @@ def epigraph_form(nlp: NLP, two_sided: bool) -> NLP:
         lifts=(*nlp.lifts, *[AddedVariable(KINK, 1, _guess_later)] * count),
         kinks=tuple(build.kinks),
     )
-    x = ca.SX.sym("x", len(plain.variables))
-    slopes = partial(_slopes, ca.jacobian(ca.vertcat(*plain.symbolic(x)), x))
+    x = ca.SX.sym("x", len(smooth_nlp.variables))
+    slopes = partial(_slopes, ca.jacobian(ca.vertcat(*smooth_nlp.symbolic(x)), x))
     contact_sets: dict[str, tuple[Contact, ...]] = {}
-    equal = set[int]()
+    equation_rows = set[int]()
     for kink in reversed(build.kinks):  # a kink comes after the kinks that it contains
         if kink.quotient:
-            equal.update(kink.rows)
-        elif not _never_improves(plain, slopes(kink.variable), 1.0, equal, kink.rows):
+            equation_rows.update(kink.rows)
+        elif not _never_improves(smooth_nlp, slopes(kink.variable), 1.0, equation_rows, kink.rows):
             contact_sets[f"{KINK}{kink.variable}"] = tuple(Contact(row=k) for k in kink.rows)
-            equal.update(kink.rows)
+            equation_rows.update(kink.rows)
     kink_rows = range(first, first + rows)
     for name, contacts in nlp.contacts.items():
         slope_of_row = slopes(nlp.variables.index(name))
         kink_slopes = {k: slope for k, slope in slope_of_row.items() if k in kink_rows}
-        if two_sided or not _never_improves(plain, kink_slopes, WORSE_DIRECTION[name], equal):
+        if two_sided or not _never_improves(smooth_nlp, kink_slopes, WORSE_DIRECTION[name], equation_rows):
             contact_sets[name] = contacts
-    return replace(plain, contacts=contact_sets)
+    return replace(smooth_nlp, contacts=contact_sets)
 
 
 def _may_have_kinks(nlp: NLP) -> bool:
@@ -134,19 +134,19 @@ class _EpigraphBuilder:
     def replace_pole(self, op: str, *operands: Any) -> Any:
         """A quotient or tangent, or a new variable for it if the denominator can vanish in the box."""
         numerator, denominator = _POLES[op](*operands)
-        denominator_formula, plain = formula([denominator]), make_node(op, *operands)
+        denominator_formula, quotient_node = formula([denominator]), make_node(op, *operands)
         if not denominator_formula.dependent_steps(self.nlp.inputs) or denominator_formula.dependent_steps(
             set(map(variable_name, range(len(self.nlp.inputs), self.count)))
         ):
-            return plain
+            return quotient_node
         box = [ball(ends) for ends in zip(self.nlp.lower, self.nlp.upper, strict=True)]
         try:
             (denominator_range,) = replace(self.nlp, formula=denominator_formula).fold(box, INTERVALS)
         except UnsupportedOperation:
-            return plain
+            return quotient_node
         lower, upper = interval(denominator_range)
         if lower > 0 or upper < 0:
-            return plain
+            return quotient_node
         t = self.variable([None], quotient=True)
         self.rows.append(t * denominator - numerator)
         return t
@@ -170,23 +170,30 @@ def _slopes(jacobian: Any, variable: int) -> dict[int, Any]:
 
 
 def _never_improves(
-    nlp: NLP, slopes: Mapping[int, Any], worse: float, equal: set[int], but: Sequence[int] = ()
+    nlp: NLP,
+    slopes: Mapping[int, Any],
+    worse_direction: float,
+    equation_rows: set[int],
+    ignored_rows: Sequence[int] = (),
 ) -> bool:
-    """Whether raising a variable (lowering it for `worse` = −1) provably improves neither the objective nor a row.
+    """Whether raising a variable provably improves neither the objective nor a row.
 
     The slopes must be constant and have the right sign.
 
     Args:
-        equal: rows that may be held as equations; a change in any direction can then be an improvement.
-        but: rows that are not considered.
+        worse_direction: 1 if the variable is raised, −1 if it is lowered instead.
+        equation_rows: rows that may be held as equations; a change in any direction can then be an improvement.
+        ignored_rows: rows that are not considered.
     """
     for k, slope in slopes.items():
-        if k in but:
+        if k in ignored_rows:
             continue
-        below, above = (True, False) if k < 0 else (np.isinf(nlp.row_lower[k]), np.isinf(nlp.row_upper[k]))
-        if k in equal or below == above or not slope.is_constant():
+        has_no_lower, has_no_upper = (
+            (True, False) if k < 0 else (np.isinf(nlp.row_lower[k]), np.isinf(nlp.row_upper[k]))
+        )
+        if k in equation_rows or has_no_lower == has_no_upper or not slope.is_constant():
             return False
-        if worse * float(slope) * (1 if below else -1) < 0:
+        if worse_direction * float(slope) * (1 if has_no_lower else -1) < 0:
             return False
     return True
 

@@ -102,20 +102,20 @@ def _lift_by_factors(
         if lead:
             build.row("a0", lead * a[0], 0.0, np.inf)
         for k in range(1, count + 1):
-            at, factor_lead = build.size[0], lead * a[0] if lead and k == 1 and not odd else None
+            first_unknown, factor_lead = build.size[0], lead * a[0] if lead and k == 1 and not odd else None
             coefficients, factor_contacts = quadratic(edge, k, case, factor_lead)
             monic.append(coefficients)
             if factor_lead is None:
-                factors.append(Factor(at, squared=squared))
+                factors.append(Factor(first_unknown, squared=squared))
             if factor_lead is None or count == 1:  # the largest roots are not on the edge
                 contacts += factor_contacts
         if odd:
-            at, (letter, lower) = build.size[0], linear
+            first_unknown, (letter, lower) = build.size[0], linear
             monic.append([lead * a[0] if lead else 1, build.variable(f"{letter}.{case}", lower)])
             if not lead:
-                factors.append(Factor(at, linear=True))
+                factors.append(Factor(first_unknown, linear=True))
             if is_shifted and (not lead or not count):
-                contacts.append(Contact(partial(_step_distance, at), variable=at))
+                contacts.append(Contact(partial(_step_distance, first_unknown), variable=first_unknown))
         build.equal(name, shift(a, edge) if is_shifted else a, [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
     scale = abs(lead) / build.scale.lead
@@ -136,10 +136,10 @@ def lift_abscissa(build: ProgramBuilder) -> LiftedQuantity:
     """
 
     def quadratic(gamma: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
-        at = build.size[0]
+        index = build.size[0]
         beta, kappa = build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)
         distances = (_pair_distance, _real_distance)
-        contacts = [Contact(partial(distance, at), variable=at + j) for j, distance in enumerate(distances)]
+        contacts = [Contact(partial(distance, index), variable=index + j) for j, distance in enumerate(distances)]
         return [1 if lead is None else lead, beta, kappa], contacts
 
     def place(is_near: bool, z: Roots, size: float) -> float:
@@ -162,13 +162,13 @@ def lift_damping_ratio(build: ProgramBuilder) -> LiftedQuantity:
     """
 
     def quadratic(zeta: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
-        at = build.size[0]
+        index = build.size[0]
         p, w, m = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0), 1.0
         if lead is not None:
             m = build.variable(f"m.{case}", 0.0)
             build.row("damping_ratio", m * m - lead, 0.0, 0.0)
         build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
-        return [m * m, p, w * w], [Contact(partial(_sector_distance, at), row=build.size[1] - 1)]
+        return [m * m, p, w * w], [Contact(partial(_sector_distance, index), row=build.size[1] - 1)]
 
     def place(is_near: bool, z: Roots, size: float) -> float:
         """ζ slightly below the smallest damping ratio."""
@@ -186,10 +186,10 @@ def lift_angular_frequency(build: ProgramBuilder) -> LiftedQuantity:
     """
 
     def quadratic(omega: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
-        at = build.size[0]
+        index = build.size[0]
         p, q, m = build.variable(f"p{k}.{case}"), build.variable(f"q{k}.{case}"), 1 if lead is None else lead
         build.row("angular_frequency", p * p + 4 * m * m * omega * omega - 4 * m * q, 0.0, np.inf)
-        return [m, p, q], [Contact(partial(_strip_distance, at), row=build.size[1] - 1)]
+        return [m, p, q], [Contact(partial(_strip_distance, index), row=build.size[1] - 1)]
 
     def place(is_near: bool, z: Roots, size: float) -> float:
         """Ω slightly above its value."""
@@ -224,9 +224,9 @@ def lift_real_roots(build: ProgramBuilder, line: bool) -> LiftedQuantity:
     contacts: list[Contact] = []
     for case in cases:
         a = build.polynomial(case)
-        at = build.size[0]
+        index = build.size[0]
         steps = [build.variable(f"d{k}.{case}", 0.0) for k in range(1, len(a))]
-        contacts.append(Contact(partial(_step_distance, at), variable=at))
+        contacts.append(Contact(partial(_step_distance, index), variable=index))
         distances = [sum(steps[:k], 0) for k in range(1, len(a))]
         build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, d] for d in distances))])
     lift = AddedVariable("abscissa", build.size[0] - first, partial(_real_guess, cases, line))
@@ -267,32 +267,32 @@ def worst_guess(
 _DOUBLE = 1e-3  # two real roots with a smaller distance, relative to the largest root, may be one double root
 
 
-def _pair_distance(at: int, x: Array) -> float:
+def _pair_distance(index: int, x: Array) -> float:
     """Distance from the line to a complex pair of t² + βt + κ, or to the middle of a real pair."""
-    return float(x[at] / 2)
+    return float(x[index] / 2)
 
 
-def _real_distance(at: int, x: Array) -> float:
+def _real_distance(index: int, x: Array) -> float:
     """Distance from the line to the nearer real root; for a complex pair, its distance plus its imaginary part."""
-    half, kappa = x[at] / 2, x[at + 1]
+    half, kappa = x[index] / 2, x[index + 1]
     offset = float(np.sqrt(abs(half * half - kappa)))
     return float(half + offset if half * half < kappa else kappa / (half + offset or 1.0))
 
 
-def _step_distance(at: int, x: Array) -> float:
+def _step_distance(index: int, x: Array) -> float:
     """Distance from the line to the rightmost root."""
-    return float(x[at])
+    return float(x[index])
 
 
-def _sector_distance(at: int, x: Array) -> float:
+def _sector_distance(index: int, x: Array) -> float:
     """Damping ratio of a pair; the pair with the smallest ratio is on the edge."""
-    p, w = x[at], x[at + 1]
+    p, w = x[index], x[index + 1]
     return float(p / (2 * w)) if w > 0 else np.inf
 
 
-def _strip_distance(at: int, x: Array) -> float:
+def _strip_distance(index: int, x: Array) -> float:
     """Minus the imaginary part of a pair, the largest of which is on the edge; positive for two real roots."""
-    square = x[at] ** 2 / 4 - x[at + 1]
+    square = x[index] ** 2 / 4 - x[index + 1]
     return float(np.copysign(np.sqrt(abs(square)), square))
 
 
@@ -306,18 +306,18 @@ def pair_roots(z: Roots) -> list[Roots]:
     If the number of roots is odd, a single real root comes last: the leftmost that is not nearly equal to another.
     """
     pairs, real = [z[k : k + 2] for k in range(0, len(z) - 1, 2) if z[k].imag], np.sort(z[z.imag == 0].real)
-    alone = real[:0]
+    single_root = real[:0]
     while len(real) > 1:
         gaps = np.diff(real)
         k = int(np.argmin(gaps))
         if gaps[k] > _DOUBLE * np.abs(z).max():
             if len(real) % 2:
-                alone, real = real[:1], real[1:]
+                single_root, real = real[:1], real[1:]
                 continue
             k = 0
         pairs.append(real[k : k + 2].astype(complex))
         real = np.delete(real, [k, k + 1])
-    lone = real if len(real) else alone
+    lone = real if len(real) else single_root
     return [*pairs, *([lone.astype(complex)] if len(lone) else [])]
 
 

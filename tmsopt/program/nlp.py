@@ -202,10 +202,10 @@ class NLP:
             ]
             order = np.argsort(distances, kind="stable")
             ranked.append([contacts[k] for k in order if distances[k] <= distances[order[0]] + tie or k == order[0]])
-        nearest = [close[0] for close in ranked]
+        nearest = [nearest_contacts[0] for nearest_contacts in ranked]
         yield self._hold_contacts(nearest)
-        for k, close in enumerate(ranked):
-            for contact in close[1:]:
+        for k, nearest_contacts in enumerate(ranked):
+            for contact in nearest_contacts[1:]:
                 yield self._hold_contacts([*nearest[:k], contact, *nearest[k + 1 :]])
 
     def _hold_contacts(self, contacts: Sequence[Contact]) -> "NLP":
@@ -239,10 +239,10 @@ class NLP:
         for factors in self.products:
             real = [real_roots for factor in factors if (real_roots := factor.real_roots(x))]
             for first, second in combinations(real, 2):
-                near = _SHARED * (1 + max(map(abs, (*first, *second))))
-                shared = min(abs(r - t) for r in first for t in second) <= near
-                double = any(len(pair) == 2 and pair[1] - pair[0] <= near for pair in (first, second))
-                if shared and not double:
+                tolerance = _SHARED * (1 + max(map(abs, (*first, *second))))
+                is_shared = min(abs(r - t) for r in first for t in second) <= tolerance
+                is_double = any(len(pair) == 2 and pair[1] - pair[0] <= tolerance for pair in (first, second))
+                if is_shared and not is_double:
                     return True
         return False
 
@@ -389,8 +389,8 @@ def proof_units(problem: Posed) -> dict[str, float]:
 
 def unit_near(size: float) -> float:
     """A power of 2 near a size; 1 if the size is ordinary, 0 or not finite."""
-    near = _ORDINARY[0] <= size <= _ORDINARY[1] or size == 0 or not np.isfinite(size)
-    return 1.0 if near else _power_of_two(np.array([size]))
+    is_ordinary = _ORDINARY[0] <= size <= _ORDINARY[1] or size == 0 or not np.isfinite(size)
+    return 1.0 if is_ordinary else _power_of_two(np.array([size]))
 
 
 def _power_of_two(sizes: Any) -> float:

@@ -54,14 +54,14 @@ def choose_starts(problem: Posed, seed: int, count: int) -> Iterator[dict[str, f
 
 def _find_stable_radius(nlp: NLP, problem: Posed, nominal: Mapping[str, float]) -> float:
     """A radius at which the design is stable in all directions of the cases; the smallest one if there is none."""
-    directed = [case for case in nlp.cases if case.direction and not case.edge]
+    direction_cases = [case for case in nlp.cases if case.direction and not case.edge]
     upper_bounds = (float(np.linalg.norm(list(case.direction.values()))) for case in nlp.cases if case.edge)
     max_radius = min(upper_bounds, default=np.inf)
-    if not directed and np.isfinite(max_radius):
+    if not direction_cases and np.isfinite(max_radius):
         return max_radius
-    for radius in (r for r in _RADII if directed and r <= max_radius):
-        at = [case.applied(nominal, radius, problem.weights) for case in directed]
-        if np.all(is_stable([[float(c) for c in problem.values(p).coefficients] for p in at])):
+    for radius in (r for r in _RADII if direction_cases and r <= max_radius):
+        designs = [case.applied(nominal, radius, problem.weights) for case in direction_cases]
+        if np.all(is_stable([[float(c) for c in problem.values(p).coefficients] for p in designs])):
             return radius
     return _RADII[-1]
 
@@ -83,8 +83,8 @@ def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], near: b
     """
     nominal = problem.ordered(design)
     radius = _find_stable_radius(nlp, problem, nominal)
-    varied = (case.applied(nominal, radius, problem.weights) for case in nlp.cases)
-    values = [problem.values(nominal).with_known({RADIUS: radius}), *map(problem.values, varied)]
+    case_parameters = (case.applied(nominal, radius, problem.weights) for case in nlp.cases)
+    values = [problem.values(nominal).with_known({RADIUS: radius}), *map(problem.values, case_parameters)]
     z = _compute_roots(nlp, values)
     x = variables_of(problem, design)
     for lift in nlp.lifts:

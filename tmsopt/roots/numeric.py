@@ -41,8 +41,8 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
     """
     c = validate_coefficients(coefficients, "roots")
     n = c.shape[-1] - 1
-    least = np.abs(c).max(axis=-1) * _LEAST_LEAD  # keeps roots within the range of doubles
-    lead = np.copysign(np.maximum(np.abs(c[..., 0]), least), c[..., 0])
+    min_lead = np.abs(c).max(axis=-1) * _LEAST_LEAD  # keeps roots within the range of doubles
+    lead = np.copysign(np.maximum(np.abs(c[..., 0]), min_lead), c[..., 0])
     with np.errstate(over="ignore", invalid="ignore"):  # a step that overflows is no improvement
         monic = (c / lead[..., None]).reshape(c[..., 0].size, n + 1)
         monic[:, 0] = 1
@@ -61,7 +61,7 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
             _STEPS,
         )
         z = _factor_roots(factors)[:, :n] * scale[:, None]
-    clamped = (np.abs(c[..., 0]) < least).reshape(-1)
+    clamped = (np.abs(c[..., 0]) < min_lead).reshape(-1)
     for row in np.flatnonzero(clamped | ~(error <= _ACCEPTED)):
         z[row] = _isolate_roots(c.reshape(-1, n + 1)[row], z[row])
     return z.reshape(*c.shape[:-1], n)
@@ -151,8 +151,8 @@ def _factors(values: NDArray[np.complex128]) -> Array:
 def _isolate_roots(coefficients: Array, numeric: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """The roots of one polynomial, correctly rounded, or the numeric ones if the roots exceed doubles."""
     each = [complex(z) for z, m in isolated_roots(coefficients.tolist()) for _ in range(m)]
-    exact = np.array(sorted(each, key=lambda z: (z.imag == 0, z.real, abs(z.imag), -z.imag)))
-    return exact if exact.shape == numeric.shape and np.all(np.isfinite(exact)) else numeric
+    isolated = np.array(sorted(each, key=lambda z: (z.imag == 0, z.real, abs(z.imag), -z.imag)))
+    return isolated if isolated.shape == numeric.shape and np.all(np.isfinite(isolated)) else numeric
 
 
 def polish(values: Array, error: Array, step: Rows, measure: Rows, steps: int) -> None:
@@ -168,9 +168,9 @@ def polish(values: Array, error: Array, step: Rows, measure: Rows, steps: int) -
             break
         trial = step(values[rows], rows)
         trial_error = measure(trial, rows)
-        better = trial_error < error[rows]
-        rows, trial_error = rows[better], trial_error[better]
-        values[rows], error[rows] = trial[better], trial_error
+        is_better = trial_error < error[rows]
+        rows, trial_error = rows[is_better], trial_error[is_better]
+        values[rows], error[rows] = trial[is_better], trial_error
         rows = rows[trial_error > GOOD]
 
 

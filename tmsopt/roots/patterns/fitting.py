@@ -62,19 +62,19 @@ def gauss_newton(form: Form, guess: Array, monic: Array, size: Array, patience: 
     u = best = guess
     if not guess.size:
         return guess
-    least, patience_left = np.inf, patience
+    best_distance, patience_left = np.inf, patience
     directions = 1e-100j * np.eye(len(u))
     for _ in range(_STEPS):
-        shifted = np.stack(np.broadcast_arrays(*form.monic([x + d for x, d in zip(u, directions, strict=True)])))
-        jacobian = shifted.imag / 1e-100 / size[:, None]
+        coefficients = np.stack(np.broadcast_arrays(*form.monic([x + d for x, d in zip(u, directions, strict=True)])))
+        jacobian = coefficients.imag / 1e-100 / size[:, None]
         residual = (np.array(form.monic(list(u)), dtype=float) - monic) / size
         if not (np.all(np.isfinite(jacobian)) and np.all(np.isfinite(residual))):
             break
         with np.errstate(over="ignore"):  # if it diverges
             distance = float(np.linalg.norm(residual))
-        patience_left = patience if distance < 0.9 * least else patience_left - 1
-        if distance < least:
-            best, least = u, distance
+        patience_left = patience if distance < 0.9 * best_distance else patience_left - 1
+        if distance < best_distance:
+            best, best_distance = u, distance
         if not patience_left:
             return best
         length = np.linalg.norm(jacobian, axis=0)

@@ -60,9 +60,9 @@ def find_multiple_roots(monic: Array, size: Array, limit: float, rounding: float
     if not best.shape.groups or best.distance <= rounding:
         return best
     # Distinct but close roots may look like one of higher multiplicity, so tighter limits are tried too.
-    for tighter in (rounding, np.sqrt(rounding * limit)):
-        if tighter < limit:
-            trial = _tie_rightmost(monic, size, _find_groups(monic, size, tighter), limit)
+    for smaller_limit in (rounding, np.sqrt(rounding * limit)):
+        if smaller_limit < limit:
+            trial = _tie_rightmost(monic, size, _find_groups(monic, size, smaller_limit), limit)
             best = max((best, trial), key=lambda fit: (fit.shape.conditions, -fit.distance))
     return best
 
@@ -72,8 +72,8 @@ def _find_groups(monic: Array, size: Array, limit: float) -> Fit:
     k = len(monic) - 1
     fit = Fit(Shape((), k), monic[1:], 0.0)
     while (k := min(k, fit.shape.rest_degree)) >= 2:
-        extended = _add_group(monic, size, fit, k, limit)
-        fit, k = (fit, k - 1) if extended is None else (extended, k)
+        next_fit = _add_group(monic, size, fit, k, limit)
+        fit, k = (fit, k - 1) if next_fit is None else (next_fit, k)
     return fit
 
 
@@ -139,17 +139,17 @@ def _fit_shape(shape: Shape, places: Sequence[complex], rest_factor: Array, moni
 
 def _tie_rightmost(monic: Array, size: Array, fit: Fit, limit: float) -> Fit:
     """The fit with as many roots tied to the rightmost line as the limit allows; if none, the given fit."""
-    simple = [z for z in numeric_roots(fit.rest_factor) if z.imag >= 0] if fit.shape.rest_degree else []
-    items = [*zip(fit.places, fit.shape.groups, strict=True), *((z, Group(1, z.imag == 0)) for z in simple)]
+    upper_roots = [z for z in numeric_roots(fit.rest_factor) if z.imag >= 0] if fit.shape.rest_degree else []
+    items = [*zip(fit.places, fit.shape.groups, strict=True), *((z, Group(1, z.imag == 0)) for z in upper_roots)]
     items.sort(key=lambda item: -item[0].real)
     gap = _LARGEST_GAP * max(abs(z) for z, _ in items)
     near_line = sum(z.real >= items[0][0].real - gap for z, _ in items)
     for count in range(near_line, 1, -1):
         if sum(g.real for _, g in items[:count]) <= 1:
-            tied = [(z, replace(g, tied=True)) for z, g in items[:count]]
+            tied_roots = [(z, replace(g, tied=True)) for z, g in items[:count]]
             multiple_roots = [(z, g) for z, g in items[count:] if g.multiplicity > 1]
             simple_roots = [z for z, g in items[count:] if g.multiplicity == 1]
-            places, groups = zip(*tied, *multiple_roots, strict=True)
+            places, groups = zip(*tied_roots, *multiple_roots, strict=True)
             free_roots = [w for z in simple_roots for w in ((z, z.conjugate()) if z.imag else (z,))]
             rest_factor = np.atleast_1d(np.poly(np.array(free_roots))).real
             trial = _fit_shape(Shape(tuple(groups), len(rest_factor) - 1), places, rest_factor, monic, size)

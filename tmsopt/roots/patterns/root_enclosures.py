@@ -129,7 +129,7 @@ def nearest_roots(coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[E
 def _fit_shape(shape: Shape, u: list[Any], target: Sequence[Any]) -> tuple[EnclosedRoot, ...] | None:
     """Roots of the nearest polynomial of a shape, from a start."""
     small = flint.arb(2) ** (_LOST_BITS * (len(target) - 1) - flint.ctx.prec)
-    trusted = flint.arb(2) ** (-flint.ctx.prec // _TRUSTED)
+    relative_radius = flint.arb(2) ** (-flint.ctx.prec // _TRUSTED)
     for _ in range(_STEPS):
         step = _step(shape, u, target)
         if step is None:
@@ -137,7 +137,7 @@ def _fit_shape(shape: Shape, u: list[Any], target: Sequence[Any]) -> tuple[Enclo
         u = [(x + d).mid() for x, d in zip(u, step, strict=True)]
         size = max(abs(x) for x in u)
         if all(abs(d) <= small * size for d in step):
-            roots = _shape_roots(shape, [x + flint.arb(0, (size * trusted).upper()) for x in u])
+            roots = _shape_roots(shape, [x + flint.arb(0, (size * relative_radius).upper()) for x in u])
             return None if roots is None else rightmost_first(roots)
     return None
 
@@ -192,8 +192,8 @@ def _step(shape: Shape, u: Sequence[Any], target: Sequence[Any]) -> list[Any] | 
         return None
     weights = _weights(roots)
     residual = flint.arb_mat([[(b - a) / w] for a, b, w in zip(shape.monic(u), target, weights, strict=True)])
-    at = dict(zip(shape.unknowns, u, strict=True))
-    slopes = jacobian(lambda values: shape.monic([*values.values()]), at, shape.unknowns)
+    unknowns = dict(zip(shape.unknowns, u, strict=True))
+    slopes = jacobian(lambda values: shape.monic([*values.values()]), unknowns, shape.unknowns)
     rows = flint.arb_mat([[slope / w for slope in row] for row, w in zip(slopes.tolist(), weights, strict=True)])
     try:
         return list((rows.transpose() * rows).solve(rows.transpose() * residual))

@@ -29,10 +29,10 @@ class Group:
 
 def join_group_names(names: Iterable[str], groups: Iterable[Group]) -> str:
     """Join the names of multiple roots and the names of the simple pairs and real roots among the groups."""
-    simple = [g.real for g in groups if g.multiplicity == 1]
-    count = simple.count(False)
+    are_real = [g.real for g in groups if g.multiplicity == 1]
+    count = are_real.count(False)
     pairs = ["pair"] if count == 1 else [f"{NUMBERS[count]} pairs"] if count else []
-    return "+".join([*names, *pairs, *["real"] * simple.count(True)])
+    return "+".join([*names, *pairs, *["real"] * are_real.count(True)])
 
 
 _KINDS = {(True, True): "", (True, False): "r", (False, True): "W", (False, False): "bc"}
@@ -106,8 +106,8 @@ class Shape:
 
     def start(self, places: Sequence[complex], rest_factor: Sequence[Any]) -> list[Any]:
         """Unknowns for one root of each group (the upper root of a pair) and the factor with free coefficients."""
-        tied = [z.real for z, g in zip(places, self.groups, strict=True) if g.tied for _ in range(g.degree)]
-        unknowns: list[Any] = [sum(tied) / len(tied)] if tied else []
+        line_parts = [z.real for z, g in zip(places, self.groups, strict=True) if g.tied for _ in range(g.degree)]
+        unknowns: list[Any] = [sum(line_parts) / len(line_parts)] if line_parts else []
         for z, group in zip(places, self.groups, strict=True):
             if group.tied:
                 unknowns += [] if group.real else [z.imag**2]

@@ -87,9 +87,9 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike 
     fit = find_multiple_roots(monic, size, tolerance + rounding, rounding)
     if fit.distance < tolerance - rounding or not fit.shape.groups:
         return _make_structure(fit, z, unit)
-    definite = _make_structure(find_multiple_roots(monic, size, tolerance - rounding, rounding), z, unit)
-    if definite.name not in ("pair", "real"):
-        return definite
+    certain_structure = _make_structure(find_multiple_roots(monic, size, tolerance - rounding, rounding), z, unit)
+    if certain_structure.name not in ("pair", "real"):
+        return certain_structure
     return Structure("undecided", _simple_roots(z), fit.distance)
 
 
@@ -137,9 +137,9 @@ def pattern_distance(
         fits, z = _fit_pattern(pattern, coefficients, off, tolerance)
     except ValueError:
         return float("inf")
-    least = -_BOUNDARY * np.abs(z).max() ** 2
-    inside = (distance for distance, u in fits if all(value >= least for value in pattern.nonnegative(u)))
-    return next(inside, float("inf"))
+    lower_bound = -_BOUNDARY * np.abs(z).max() ** 2
+    distances = (distance for distance, u in fits if all(value >= lower_bound for value in pattern.nonnegative(u)))
+    return next(distances, float("inf"))
 
 
 def fit_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[list[float]]:
@@ -190,9 +190,9 @@ def _make_structure(fit: Fit, numeric: Roots, unit: float) -> Structure:
     upper += [(z * unit, 1) for z in (numeric_roots(fit.rest_factor) if fit.shape.rest_degree else ()) if z.imag >= 0]
     right = max(z.real for z, _ in upper)
     line = [Group(multiplicity, z.imag == 0) for z, multiplicity in upper if z.real == right]
-    least = _ZERO * max(abs(z) for z, _ in upper)
+    zero_size = _ZERO * max(abs(z) for z, _ in upper)
     all_roots = ((w, m) for z, m in upper for w in ((z, z.conjugate()) if z.imag else (z,)))
-    roots = [Root(float(w.real) if abs(w.real) > least else 0.0, float(w.imag), m) for w, m in all_roots]
+    roots = [Root(float(w.real) if abs(w.real) > zero_size else 0.0, float(w.imag), m) for w, m in all_roots]
     two_double = [(root.im, root.multiplicity) for root in roots] == [(0.0, 2), (0.0, 2)]
     return Structure("2EP2" if two_double else _name_line(line), rightmost_first(roots), fit.distance)
 
