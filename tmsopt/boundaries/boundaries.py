@@ -80,8 +80,8 @@ class Edge:
     def guess(self, c: Array) -> list[float]:
         """Unknowns near numeric coefficients.
 
-        The divisor is the candidate that divides c best. The quadratic factors of the quotient pair neighbouring roots;
-        the rightmost real root is that of the linear factor.
+        The divisor is the candidate that divides c best. The quadratic factors of the quotient have pairs of
+        neighbouring roots, and the linear factor has the rightmost real root.
         """
         size = measure_terms(c)
 
@@ -115,7 +115,7 @@ class Edge:
 def list_edges(degree: int) -> Table[Edge]:
     """All pieces of the boundaries for polynomials of a degree ≥ 2, by name.
 
-    From outside heavy damping, the nearest polynomial with real roots is on one edge or on several.
+    For a polynomial that is not heavily damped, the nearest one with real roots alone is on one edge or on several.
     """
     edges = (
         Edge("weave", degree, False, lambda e: [e, 0, 1 - e], _pairs),

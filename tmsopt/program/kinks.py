@@ -1,8 +1,9 @@
 """Replaces abs, min and max in an NLP by variables, since a smooth solver cannot handle kinks.
 
-Each is written with the greatest of some pieces: |e| is the greatest of e and −e; min(a, b) is minus the greatest of −a
-and −b. The greatest becomes a variable t with a row t ≥ piece for every piece. This is exact if a larger t is never an
-advantage. Otherwise a *contact* is needed: t is held equal to one piece at a time, and the other pieces are below it.
+Each of them is written with the greatest of some pieces: |e| is the greatest of e and −e; min(a, b) is minus the
+greatest of −a and −b. The greatest becomes a variable t with a row t ≥ piece for every piece. This is exact if a larger
+t is never an advantage. Otherwise a *contact* is needed: t is held equal to one piece at a time, and the other pieces
+are below it.
 
 A quotient or tangent with a pole in the box becomes a variable t with the equation t · denominator = numerator, which
 is smooth on both sides of the pole.
@@ -60,7 +61,7 @@ def epigraph_form(nlp: NLP, two_sided: bool) -> NLP:
     slopes = partial(_slopes, ca.jacobian(ca.vertcat(*smooth_nlp.symbolic(x)), x))
     contact_sets: dict[str, tuple[Contact, ...]] = {}
     equation_rows = set[int]()
-    for kink in reversed(build.kinks):  # a kink comes after the kinks that it contains
+    for kink in reversed(build.kinks):  # first the kinks that contain others
         if kink.quotient:
             equation_rows.update(kink.rows)
         elif not _never_improves(smooth_nlp, slopes(kink.variable), 1.0, equation_rows, kink.rows):

@@ -25,7 +25,7 @@ class ProgramBuilder(Protocol):
         """A new row."""
 
     def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
-        """Equate coefficient lists."""
+        """New rows that equate two lists of coefficients."""
 
     def polynomial(self, case: int) -> list[Any]:
         """Coefficients in one case, in the units of the NLP."""
@@ -78,17 +78,17 @@ def _lift_by_factors(
 ) -> LiftedQuantity:
     """A root quantity as a variable v, with the polynomial of each covered case as a product of quadratic factors.
 
-    An odd degree adds one linear factor.
+    If the degree is odd, the product has one linear factor too.
 
     Args:
-        name: of the quantity and of its rows.
-        bounds: of v.
+        name: name of the quantity and of its rows.
+        bounds: lower and upper bound of v.
         quadratic: (v, number, case, lead) → coefficients and contacts of a factor; `lead` is ±a0 in the factor that
             takes it so that the NLP reaches a0 = 0, else None.
         place: (near a solution, roots, their mean size) → starting value of v, for which the factors are feasible.
-        unit: of v.
+        unit: unit of v.
         linear: name and lower bound of the constant term of the linear factor.
-        all_real: the value of v that real roots alone allow.
+        all_real: the value of v that is possible only if all roots are real.
         is_shifted: whether the polynomials are shifted by v, so that a root of a linear factor may be on the edge.
         squared: see `Factor`.
     """

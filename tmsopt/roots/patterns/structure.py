@@ -153,7 +153,7 @@ def _fit_pattern(
     """Distance and unknowns of the fit from each guess, the nearest first, and the numeric roots.
 
     Raises:
-        ValueError: for coefficients of another degree than the pattern's.
+        ValueError: if the degree of the polynomial is not that of the pattern.
     """
     c = _validate(coefficients)
     if len(c) - 1 != pattern.degree:
@@ -166,7 +166,7 @@ def _fit_pattern(
 
 
 def guess_distance(pattern: Pattern, coefficients: Array, z: Roots) -> float:
-    """Relative distance of a polynomial with roots z from the best guess of a pattern, without a fit; inf if none."""
+    """Relative distance from a polynomial with roots z to the best guess of a pattern; inf if there is no guess."""
     size, monic = term_sizes(z), coefficients / coefficients[0]
     return min((relative_distance(pattern, g, monic, size) for g in pattern.guesses(z)), default=float("inf"))
 
