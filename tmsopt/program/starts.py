@@ -41,10 +41,10 @@ def choose_starts(problem: Posed, seed: int, count: int) -> Iterator[dict[str, f
         best = corners[int(np.argmin(objective + violation))]
         yield dict(zip(problem.free, best.tolist(), strict=True))
         count -= 1
-    pool_of = sample_box(problem, seed)
+    designs = sample_box(problem, seed)
     for first in range(0, count, _BATCH):
         size = min(_BATCH, count - first)
-        pool = list(islice(pool_of, _CANDIDATES * size))
+        pool = list(islice(designs, _CANDIDATES * size))
         pool = [_move_to_faces(problem, d) if k // _CANDIDATES % 3 == 2 else d for k, d in enumerate(pool)]
         columns = {n: np.array([d[n] for d in pool]) for n in problem.free}
         objective, violation = (m.reshape(size, _CANDIDATES) for m in _measure_merit(problem, columns))

@@ -112,11 +112,11 @@ def _find_marks(placed: Sequence[tuple[Component, slice]], free_count: int) -> d
     if len(placed) > 1:
         return marks
     ((only, place),) = placed
-    end = place.stop
+    free_start = place.stop
     if only.is_quadratic and len(only.unknowns) == 2:
         marks[f"EP{2 * only.order}"] = lambda u: u[0] * u[0] - 4 * u[1]
     if free_count and only.unknowns == ("r",):
-        marks[f"EP{only.order + 1}"] = lambda u: evaluate([1, *u[end:]], u[0])
+        marks[f"EP{only.order + 1}"] = lambda u: evaluate([1, *u[free_start:]], u[0])
         marks["double zero" if only.order == 2 else f"{only.order}-fold zero"] = lambda u: u[0]
     if free_count and only.kind in ("EP", "CEP"):
         marks["capsize"] = lambda u: u[-1]
@@ -124,7 +124,7 @@ def _find_marks(placed: Sequence[tuple[Component, slice]], free_count: int) -> d
         marks["double zero"] = lambda u: u[-1]
     if free_count > 1 and only.kind not in ("weave", "resonance"):
         name = "EP2" if only.kind == "capsize" else _join_names(only.name, "EP2")
-        marks[name] = lambda u: double_root_test([1, *u[end:]])
+        marks[name] = lambda u: double_root_test([1, *u[free_start:]])
     return marks
 
 
