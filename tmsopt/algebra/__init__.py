@@ -1,7 +1,7 @@
-"""One formula for floats, arrays, CasADi expressions, fractions and balls.
+"""One formula for floats, arrays, CasADi expressions, fractions and balls (intervals with a midpoint and a radius).
 
 In: formulas written once as plain arithmetic, and numbers of any of these kinds. Out: values of the same kind,
-enclosures, and solutions proved by interval Newton. Open `kinds` first: it lists what each kind of number can do.
+enclosures, and solutions proved by interval Newton. Open `kinds` first: it lists the operations of each kind of number.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""Evaluates a formula on large arrays, a block at a time, so that the work stays in the cache.
+"""Evaluates a formula on large arrays, one block after another, so that the data stay in the cache.
 
 Shapes follow NumPy's broadcasting. A step that depends on a single axis is computed along it, in shape (1, n) or
 (m, 1); a step that depends on no axis is one number.
@@ -18,20 +18,22 @@ BLOCK = 2**14
 """Elements of a block: 128 kB for each array."""
 
 
-def evaluate_on_arrays(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
-    """Outputs for numbers and arrays, each in the shape of its inputs; nan and inf come without a warning.
+def evaluate_on_arrays(formula: Formula, numbers: Mapping[str, Any]) -> list[Any]:
+    """Outputs for numbers and arrays, each in the common shape of its inputs; nan and inf give no warning.
 
-    If an input carries error bounds, so do the outputs.
+    If an input has error bounds, the outputs have error bounds too.
     """
-    if Bounded in map(type, given.values()):
+    if Bounded in map(type, numbers.values()):
         with np.errstate(all="ignore"):
-            return fold(formula, {n: as_bounded(given[n]) for n in formula.inputs}, BALLS)
-    columns = {name: np.asarray(given[name], dtype=float)[()] for name in formula.inputs}
+            return fold(formula, {n: as_bounded(numbers[n]) for n in formula.inputs}, BALLS)
+    columns = {name: np.asarray(numbers[name], dtype=float)[()] for name in formula.inputs}
     shape = np.broadcast_shapes(*map(np.shape, columns.values()))
     with np.errstate(all="ignore"):
         if math.prod(shape) <= BLOCK:
             return fold(formula, columns, FLOATS)
-        strides = {n: np.broadcast_to(x, shape).strides for n, x in columns.items()}  # 0 along axes without influence
+        strides = {
+            n: np.broadcast_to(x, shape).strides for n, x in columns.items()
+        }  # 0 along an axis on which a column does not depend
         axes = [k for k, n in enumerate(shape) if n != 1]
         large = set.intersection(*(formula.dependent_steps([n for n in columns if strides[n][k]]) for k in axes))
         names, small, rest = formula.split(large)

@@ -17,9 +17,9 @@ import flint
 from tmsopt.algebra.rounding import Bounded
 
 DIGITS = 60
-"""Decimal digits of the usual working precision."""
+"""Decimal digits of the working precision in most computations."""
 
-_LARGEST_EXPONENT = 2**20  # of two, in a fraction made from a ball
+_LARGEST_EXPONENT = 2**20  # of 2, in a fraction that is made from a ball
 
 GUARD = 5
 """Decimal digits written in addition to the requested ones."""
@@ -55,7 +55,7 @@ class ProvedRoot:
 
 
 def number(ball: Any, digits: int) -> Number:
-    """A ball as a decimal of `digits` + `GUARD` digits, or fewer if its radius is large."""
+    """A ball as a decimal of `digits` + `GUARD` digits, or of fewer digits if the radius of the ball is large."""
     if not ball.is_finite():
         return Number("nan", "inf")
     if ball == 0:
@@ -78,7 +78,7 @@ def fraction(value: Fraction, digits: int) -> Number:
 
 
 def _format_decimal(middle: int, exponent: int) -> str:
-    """middle · 10^exponent in plain digits, or with an exponent if these would be many."""
+    """middle · 10^exponent in plain digits, or with an exponent if there would be many digits."""
     decimal, digits = Decimal(f"{middle}e{exponent}"), str(abs(middle))
     leading = decimal.adjusted()
     if leading >= -6 and (exponent <= 0 or leading < 20):
@@ -100,14 +100,14 @@ def largest_radius(balls: Sequence[Any]) -> float:
 
 
 def upper(ball: Any) -> float:
-    """A double that no number of the ball exceeds; the ball must be within the range of doubles."""
+    """A double that is at least every number of a ball; the ball must be within the range of doubles."""
     top = ball.upper()
     value = float(top)
     return value if flint.arb(value) >= top else value * (1 + 2**-51) + 5e-324
 
 
 def lower(ball: Any) -> float:
-    """A double that no number of the positive ball falls below."""
+    """A double that is at most every number of a positive ball."""
     bottom = ball.lower()
     value = float(bottom)
     return value if flint.arb(value) <= bottom else value * (1 - 2**-51)
@@ -125,7 +125,7 @@ class Tilt:
 
 
 def is_ball(x: Any) -> bool:
-    """Whether x is a number of ball arithmetic, including exact fractions and polynomials."""
+    """Whether x is a number of ball arithmetic; exact fractions and polynomials are such numbers too."""
     return isinstance(x, flint.fmpq | flint.arb | flint.arb_series | flint.fmpq_poly | flint.arb_poly | Bounded | Tilt)
 
 

@@ -21,7 +21,7 @@ Constant = Union[Fraction, float, "Formula"]
 """A fraction; a formula without inputs for an irrational number, as √2 or π; a float for nan and infinities only."""
 
 _LARGEST_POWER = 64  # exponent up to which a power of fractions is multiplied out
-_LARGEST_BITS = 2**12  # bits that such a power may have
+_LARGEST_BITS = 2**12  # of such a power
 
 
 class UnsupportedOperation(ValueError):
@@ -47,9 +47,9 @@ class Formula:
     """Outputs as functions of inputs, for numbers of any kind.
 
     Attributes:
-        names: of all inputs, used or not.
-        steps: each once, in an order in which they can be computed.
-        outputs: indices of steps.
+        names: names of all inputs, also of those that no step uses.
+        steps: the operations, each once, in an order in which they can be computed.
+        outputs: indices of the steps whose results are the outputs.
     """
 
     names: tuple[str, ...]
@@ -64,7 +64,7 @@ class Formula:
         return hash((self.names, self.steps, self.outputs))
 
     def extract(self, outputs: Sequence[int], inputs: Collection[int] = ()) -> "Formula":
-        """The formula of some steps, in which the steps `inputs` become inputs named by their indices."""
+        """The formula of some steps; the steps `inputs` become inputs, whose names are their indices."""
         used = set(outputs)
         for k in range(len(self.steps) - 1, -1, -1):
             if k in used and k not in inputs:
@@ -81,7 +81,7 @@ class Formula:
     def split(self, late: Collection[int]) -> tuple[tuple[str, ...], "Formula", "Formula"]:
         """Split the formula into early and late steps.
 
-        Constants stay with the late steps that use them, so that an exponent remains a number, without a derivative.
+        Constants stay with the late steps that use them, so that an exponent stays a number that has no derivative.
 
         Returns:
             Names of the early results that late steps and outputs use, the formula of these results, and the formula of
@@ -162,7 +162,7 @@ def fold(
         elif (operation := operations.get(op)) is None:
             raise UnsupportedOperation(op)
         else:
-            if len(operands) == 2:  # by far the most frequent, and faster this way
+            if len(operands) == 2:  # the most frequent case; this is faster than the general code
                 result = operation(results[operands[0]], results[operands[1]])
             else:
                 result = operation(*map(results.__getitem__, operands))
@@ -185,8 +185,8 @@ def _operators(op: str) -> tuple[Callable[["Node", Any], "Node"], Callable[["Nod
 class Node:
     """An input, a constant, or an operation on other nodes, built by ordinary arithmetic.
 
-    Simplifications that hold for every number are applied: 0 + x is x, fractions are computed, and 0 x is 0 if x always
-    has a value. A factor 0.0 stays, since 0.0 times infinity is nan.
+    A node is simplified if the simplification holds for every number: 0 + x becomes x, fractions are computed, and 0 x
+    becomes 0 if x always has a value. A factor 0.0 stays, since 0.0 times infinity is nan.
 
     Attributes:
         fixed: whether it depends on no input.
@@ -279,7 +279,7 @@ def make_node(op: str, *arguments: Any) -> Node:
 
 _CONDITIONS = {"less", "at_most", "equal", "negligible", "both", "either", "not"}
 _CONDITION_OPERANDS = {"choose": 1, "both": 2, "either": 2, "not": 1}
-"""How many of the first operands of an operation are conditions; all others are numbers."""
+"""Operation → number of its first operands that are conditions; all other operands are numbers."""
 
 
 def _as_condition(x: Node) -> Node:
@@ -292,9 +292,9 @@ def _as_number(x: Node) -> Node:
 
 
 def _power(a: Fraction, b: Fraction) -> Fraction | None:
-    exact = b.denominator == 1 and abs(b) <= _LARGEST_POWER and (a != 0 or b > 0)
+    is_computed = b.denominator == 1 and abs(b) <= _LARGEST_POWER and (a != 0 or b > 0)
     bits = max(a.numerator.bit_length(), a.denominator.bit_length())
-    return a ** int(b) if exact and bits * abs(b) <= _LARGEST_BITS else None
+    return a ** int(b) if is_computed and bits * abs(b) <= _LARGEST_BITS else None
 
 
 _EXACT: Mapping[str, Callable[..., Fraction | None]] = {
@@ -307,7 +307,7 @@ _EXACT: Mapping[str, Callable[..., Fraction | None]] = {
     "abs": abs,
     "pow": _power,
 }
-"""Operations that give a fraction for fractions; None where they do not."""
+"""Operations that give a fraction for fractions; None if the result is no fraction."""
 
 _SIMPLIFIABLE = {"add", "sub", "mul", "div", "pow", "neg", "exp", "sin", "cos", "tan", "asin", "atan"}
 
@@ -347,7 +347,7 @@ def _simplify(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction 
 
 
 def formula(outputs: Iterable[Any], names: Iterable[str] = ()) -> Formula:
-    """The formula of nodes and numbers; `names` come first among its inputs, then the others in order of use."""
+    """The formula of nodes and numbers. Its inputs are `names`, then all other inputs in the order of their use."""
     return _list_steps([_as_number(constant(x)) for x in outputs], names)
 
 
@@ -358,22 +358,22 @@ def _list_steps(outputs: Sequence[Node], names: Iterable[str] = (), nested: bool
         nested: whether a node without inputs becomes one constant, a formula of its own.
     """
     indices: dict[Step, int] = {}
-    done: dict[int, int] = {}  # id of a node → index; the outputs keep the nodes alive
-    waiting = list(outputs[::-1])
-    while waiting:
-        node = waiting.pop()
-        if id(node) in done:
+    node_indices: dict[int, int] = {}  # id of a node → index; the outputs keep the nodes alive
+    pending_nodes = list(outputs[::-1])
+    while pending_nodes:
+        node = pending_nodes.pop()
+        if id(node) in node_indices:
             continue
         if nested and node.fixed and node.op != CONSTANT:
             step = Step(CONSTANT, (), _list_steps([node], nested=False))
-        elif done.keys() >= set(map(id, node.operands)):
-            step = Step(node.op, tuple(map(done.__getitem__, map(id, node.operands))), node.value)
+        elif node_indices.keys() >= set(map(id, node.operands)):
+            step = Step(node.op, tuple(map(node_indices.__getitem__, map(id, node.operands))), node.value)
         else:
-            waiting += [node, *node.operands[::-1]]
+            pending_nodes += [node, *node.operands[::-1]]
             continue
-        done[id(node)] = indices.setdefault(step, len(indices))
+        node_indices[id(node)] = indices.setdefault(step, len(indices))
     inputs = [step.value for step in indices if step.op == INPUT]
-    places = tuple(map(done.__getitem__, map(id, outputs)))
+    places = tuple(map(node_indices.__getitem__, map(id, outputs)))
     return Formula(tuple(dict.fromkeys((*names, *inputs))), tuple(indices), places)
 
 
@@ -454,4 +454,4 @@ _ALIASES = {
     "and": "both",
     "or": "either",
 }
-"""Names in NumPy and CasADi → name of the operation."""
+"""Name in NumPy or CasADi → name of the operation."""

@@ -1,7 +1,7 @@
 """Decides whether an expression is 0 for all values of its symbols, by normal forms of rational functions.
 
-Each function that is not rational, with each of its arguments, is an unknown of its own. Its relations are used:
-sin² + cos² = 1, tan = sin/cos, √x² = x and |x|² = x². An expression that is 0 for another reason is not recognised.
+Each value of a function that is not rational, such as sin x, is an additional unknown. These relations between unknowns
+are used: sin² + cos² = 1, tan = sin/cos, (√x)² = x and |x|² = x². Other reasons for being 0 are not recognised.
 """
 
 import math
@@ -30,13 +30,13 @@ from tmsopt.algebra.formula import (
 )
 from tmsopt.algebra.kinds import ARITHMETIC, NODES
 
-_LARGEST_POWER = 64  # exponent up to which a power is multiplied out
-_MOST_PRODUCTS = 10**7  # of two terms, in one multiplication; more would take minutes and exhaust the memory
+_LARGEST_POWER = 64  # largest exponent of a power that is multiplied out
+_MOST_PRODUCTS = 10**7  # of two terms, in one multiplication; more of them would take minutes and all memory
 
 
 @dataclass(frozen=True, eq=False)
 class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap hash
-    """A quotient of two polynomials, equal to another one if the cross products are equal."""
+    """A quotient of two polynomials; two quotients are equal if their cross products are equal."""
 
     numerator: Any
     denominator: Any = None  # by default the polynomial 1
@@ -52,8 +52,8 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
 
     def __add__(self, other: Any) -> "Quotient":
         o = self._convert(other)
-        crossed = _multiply(self.numerator, o.denominator) + _multiply(o.numerator, self.denominator)
-        return Quotient(crossed, _multiply(self.denominator, o.denominator))
+        cross_sum = _multiply(self.numerator, o.denominator) + _multiply(o.numerator, self.denominator)
+        return Quotient(cross_sum, _multiply(self.denominator, o.denominator))
 
     def __mul__(self, other: Any) -> "Quotient":
         o = self._convert(other)
@@ -109,13 +109,13 @@ def _power(a: Any, n: int) -> Any:
 
 
 class Field:
-    """The rational functions of the inputs of one formula and of its functions that are not rational."""
+    """The rational functions of the inputs of one formula, and of the values of its functions that are not rational."""
 
     def __init__(self, formula: Formula) -> None:
         formulas = [formula, *(step.value for step in formula.steps if isinstance(step.value, Formula))]
-        others = sum(step.op not in (INPUT, CONSTANT) for each in formulas for step in each.steps)
+        function_count = sum(step.op not in (INPUT, CONSTANT) for each in formulas for step in each.steps)
         count = len(formula.names)
-        context = flint.fmpq_mpoly_ctx.get(tuple(f"x{k}" for k in range(count + 2 * others + 1)), "lex")
+        context = flint.fmpq_mpoly_ctx.get(tuple(f"x{k}" for k in range(count + 2 * function_count + 1)), "lex")
         self._context = context
         self.inputs = {name: self._generator(k) for k, name in enumerate(formula.names)}
         self._nodes = [symbol(name) for name in formula.names]  # the meaning of each unknown
@@ -135,13 +135,13 @@ class Field:
         )
 
     def number(self, x: Constant) -> Quotient:
-        """A constant of a formula, irrational ones by unknowns for their functions."""
+        """A constant of a formula; an irrational constant contains unknowns for its functions."""
         if isinstance(x, Formula):
             return fold(x, {}, self.kind)[0]  # type: ignore[no-any-return]
         return Quotient(self._context.constant(rational(x)))
 
     def is_zero(self, x: Any) -> bool:
-        """Whether an element is 0 for all values. True is certain; False is not."""
+        """Whether an element is 0 for all values of the inputs. True is certain; False is not."""
         if not isinstance(x, Quotient):
             return bool(x == 0)
         for index, square in reversed(self._squares):
@@ -155,7 +155,7 @@ class Field:
         return not x.numerator
 
     def node(self, x: Quotient) -> Node:
-        """An element as a node, multiplied out and written by Horner's rule."""
+        """An element as a node, multiplied out and then written by Horner's rule."""
         lead = x.denominator.leading_coefficient()
         return self._factor_out((x.numerator / lead).to_dict()) / self._factor_out((x.denominator / lead).to_dict())
 
@@ -167,14 +167,14 @@ class Field:
         k = max(range(len(count)), key=lambda j: (count[j], str(self._nodes[j].value if j < len(self._nodes) else "")))
         power = min(monomial[k] for monomial in terms if monomial[k])
         inner = {(*m[:k], m[k] - power, *m[k + 1 :]): c for m, c in terms.items() if m[k]}
-        rest = {m: c for m, c in terms.items() if not m[k]}
+        remaining_terms = {m: c for m, c in terms.items() if not m[k]}
         product = self._factor_out(inner) * self._nodes[k] ** int(power)
-        return product + self._factor_out(rest) if rest else product
+        return product + self._factor_out(remaining_terms) if remaining_terms else product
 
     def _apply(self, operation: str, *operands: Quotient, square: Callable[[], Quotient] | None = None) -> Quotient:
-        """The unknown for a function of operands, the same one for equal operands."""
-        for other, others, unknown in self._functions:
-            if other == operation and all(a == b for a, b in zip(others, operands, strict=True)):
+        """The unknown for a function of some operands; equal operands give the same unknown."""
+        for known_operation, known_operands, unknown in self._functions:
+            if known_operation == operation and all(a == b for a, b in zip(known_operands, operands, strict=True)):
                 return unknown
         index = len(self._nodes)
         unknown = self._generator(index)
@@ -214,5 +214,7 @@ def is_linear(formula: Formula) -> bool:
     """Whether a formula of one output is linear in its inputs. True is certain; False is not."""
     field = Field(formula)
     (output,) = fold(formula, field.inputs, field.kind)
-    plain = (sum(exponents) == sum(exponents[: len(formula.names)]) <= 1 for exponents in output.numerator.to_dict())
-    return bool(output.denominator.is_constant()) and all(plain)
+    terms_are_linear = (
+        sum(exponents) == sum(exponents[: len(formula.names)]) <= 1 for exponents in output.numerator.to_dict()
+    )
+    return bool(output.denominator.is_constant()) and all(terms_are_linear)

@@ -1,4 +1,4 @@
-"""Ranges of expressions over a box, by interval arithmetic with outward rounding (balls of Arb)."""
+"""Bounds expressions over a box, by interval arithmetic with outward rounding (balls of Arb)."""
 
 import math
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ def interval(x: Any) -> Interval:
 
 
 def round_outwards(lower: float, upper: float) -> Interval:
-    """Doubles that enclose an interval whose ends are decimals; equal ends stay as they are."""
+    """Doubles that enclose an interval whose ends are decimals; equal ends are returned unchanged."""
     return (lower, upper) if lower == upper else (math.nextafter(lower, -math.inf), math.nextafter(upper, math.inf))
 
 
@@ -45,15 +45,15 @@ def ranges(formula: Formula, box: Sequence[Interval]) -> list[Interval]:
 
 
 def bound_roots(coefficients: Sequence[Interval]) -> float:
-    """Upper bound of |s| over the roots of all polynomials with such coefficients, descending.
+    """Upper bound of |s| over the roots of all polynomials with coefficients in these intervals, descending.
 
-    Fujiwara's 2 max |a_k/a0|^(1/k), with half of |aₙ/a0| in the last term; inf if a0 may be 0.
+    The bound is that of Fujiwara, 2 max |a_k/a0|^(1/k) with half of |aₙ/a0| in the last term; inf if a0 may be 0.
     """
     with flint.ctx.workprec(_PRECISION):
         a = [ball(ends) for ends in coefficients]
-        least = abs(a[0]).lower()
-        if not (a[0].is_finite() and least > 0):
+        min_lead = abs(a[0]).lower()
+        if not (a[0].is_finite() and min_lead > 0):
             return math.inf
         n = len(a) - 1
-        terms = [(abs(c).upper() / least / (2 if k == n else 1)).root(k) for k, c in enumerate(a[1:], start=1)]
+        terms = [(abs(c).upper() / min_lead / (2 if k == n else 1)).root(k) for k, c in enumerate(a[1:], start=1)]
         return max(interval(2 * t)[1] for t in terms)

@@ -3,7 +3,7 @@
 A condition on balls is True, False or None (undecided); on series, undecided is nan. Operations besides the usual ones:
 
     quotient      a / b, nan where b is 0: a quantity that does not exist, not an infinite one
-    ratio         the same, but 0 where a is 0, for every b
+    ratio         a / b, but 0 where a is 0, for every b
     choose        b where the condition a holds, else c
     positive_part a where it is positive, else 0
     negligible    whether a is 0, or only the rounding error of a sum of terms of size b
@@ -36,9 +36,9 @@ from tmsopt.algebra.formula import (
 )
 from tmsopt.algebra.rounding import Bounded
 
-_LARGEST_POWER = 1023  # exponent up to which a power of balls is a product
+_LARGEST_POWER = 1023  # largest exponent for which a power of balls is a product
 _LARGEST_BITS = 2**22  # of a power of a fraction
-_TINY = 1e-300  # avoids 0/0 in an optimiser and changes nothing else
+_TINY = 1e-300  # avoids 0/0 in a solver and changes no other value
 ROUNDING = 4 * float(np.finfo(float).eps)
 """Rounding error of a sum of a few terms, relative to their size."""
 
@@ -91,7 +91,7 @@ def _double(value: Fraction | Formula) -> Any:
 
 
 def _power(base: Any, exponent: Any) -> Any:
-    """A power; common exponents as products and roots, each rounded correctly."""
+    """A power; common exponents are computed as products and roots, which are more accurate."""
     small = _POWERS.get(float(exponent)) if np.ndim(exponent) == 0 else None
     return np.power(base, exponent) if small is None else small(base)
 
@@ -212,7 +212,7 @@ def _ball_power(a: Any, b: Any) -> Any:
 
 
 def magnitude(x: Any) -> Any:
-    """|x| of a ball; if the sign of a series is undecided, its derivatives may have either sign."""
+    """|x| of a ball; if the sign of a series is undecided, the balls of its derivatives contain both signs."""
     if not isinstance(x, flint.arb_series):
         return abs(x)
     first = x[0]
@@ -225,7 +225,7 @@ def magnitude(x: Any) -> Any:
 
 
 def greater(a: Any, b: Any) -> Any:
-    """The greater of two balls: one of the two if that is decided, else (a + b + |a − b|)/2."""
+    """The greater of two balls: one of the two if their order is decided, else (a + b + |a − b|)/2."""
     if isinstance(a, Bounded) or isinstance(b, Bounded):
         return rounding.greater(a, b)
     difference = a - b
@@ -256,16 +256,16 @@ def _compare(holds: Callable[..., Any], fails: Callable[..., Any], a: Any, b: An
 
 
 def _ball_choice(condition: Any, a: Any, b: Any) -> Any:
-    """a if the condition holds, else b; a ball around both if it is undecided."""
+    """a if the condition holds, else b; a ball that contains both if the condition is undecided."""
     if isinstance(condition, float | flint.arb):  # nan, from series: a jump has no derivative
         return flint.arb("nan")
     if isinstance(condition, np.ndarray):
-        one, other = rounding.as_bounded(a), rounding.as_bounded(b)
-        return one.where(condition == 1, other).where(~np.isnan(condition), Bounded(np.nan, np.inf))
+        first, second = rounding.as_bounded(a), rounding.as_bounded(b)
+        return first.where(condition == 1, second).where(~np.isnan(condition), Bounded(np.nan, np.inf))
     if condition is None:
-        one, other = as_ball(a), as_ball(b)
-        finite = all(isinstance(x, flint.arb) and x.is_finite() for x in (one, other))
-        return one.union(other) if finite else flint.arb("nan")
+        first, second = as_ball(a), as_ball(b)
+        finite = all(isinstance(x, flint.arb) and x.is_finite() for x in (first, second))
+        return first.union(second) if finite else flint.arb("nan")
     return a if condition else b
 
 
@@ -342,7 +342,7 @@ INTERVALS = Kind(
     {**BALLS.operations, "square": square, "pow": _interval_power},
     lambda value: flint.arb(as_exact(value)),
 )
-"""Balls as wide as a box; an even power never reaches below 0."""
+"""Balls that are as wide as a box; an even power is never below 0."""
 
 
 # Nodes: formulas of formulas.
@@ -357,7 +357,7 @@ NODES = Kind({name: partial(make_node, name) for name in (*FLOATS.operations, "p
 
 
 def kind_of(*numbers: Any) -> Kind:
-    """The common kind of numbers; floats convert to every other kind."""
+    """The common kind of numbers; floats can be converted to every other kind."""
     kind = FLOATS
     for x in numbers:
         if isinstance(x, float):  # by far the most frequent
@@ -371,10 +371,10 @@ def kind_of(*numbers: Any) -> Kind:
     return kind
 
 
-def values(formula: Formula, given: Mapping[str, Any]) -> list[Any]:
-    """Outputs of a formula for numbers of any kind; nan and inf of floats come without a warning."""
+def values(formula: Formula, inputs: Mapping[str, Any]) -> list[Any]:
+    """Outputs of a formula for numbers of any kind; nan and inf of floats give no warning."""
     with np.errstate(all="ignore"):
-        return fold(formula, given, kind_of(*[given[name] for name in formula.names if name in given]))
+        return fold(formula, inputs, kind_of(*[inputs[name] for name in formula.names if name in inputs]))
 
 
 # Operations of formulas, on numbers of any kind.

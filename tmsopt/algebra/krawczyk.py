@@ -19,7 +19,7 @@ from tmsopt.records import Table
 System = Callable[[Mapping[str, Any]], list[Any]]
 """Left-hand sides of the equations, as a function of balls or series by name."""
 
-_STEPS = 60
+_STEPS = 60  # of Newton's method
 _DECADES = 80  # powers of ten over which the radius of the box is reduced
 _BOXES_PER_DECADE = 4
 
@@ -41,9 +41,9 @@ class Enclosure:
     uniqueness: float
 
 
-def jacobian(system: System, at: Mapping[str, Any], names: Sequence[str]) -> Any:
+def jacobian(system: System, point: Mapping[str, Any], names: Sequence[str]) -> Any:
     """Jacobian of a system with respect to some of its names, one column for each, by first-order series."""
-    columns = [system({**at, n: flint.arb_series([at[n], 1], prec=2)}) for n in names]
+    columns = [system({**point, n: flint.arb_series([point[n], 1], prec=2)}) for n in names]
     rows = zip(*columns, strict=True)
     return flint.arb_mat([[v[1] if isinstance(v, flint.arb_series) else flint.arb(0) for v in row] for row in rows])
 
@@ -51,7 +51,7 @@ def jacobian(system: System, at: Mapping[str, Any], names: Sequence[str]) -> Any
 def refine_solution(
     system: System, start: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = Table()
 ) -> dict[str, Any]:
-    """Find the solution near a start, as exact midpoints, by Newton's method at the working precision.
+    """Find the solution near a start by Newton's method at the working precision; the results are exact midpoints.
 
     Args:
         digits: relative accuracy at which the iteration stops, in decimal digits.
@@ -60,17 +60,17 @@ def refine_solution(
     Raises:
         ProofFailed: if Newton's method does not converge.
     """
-    at = dict(start)
+    point = dict(start)
     tolerance = flint.arb(10) ** -digits
     for _ in range(_STEPS):
-        step = _solve_linear(jacobian(system, at, names), flint.arb_mat([[r.mid()] for r in system(at)]))
-        sizes = [(abs(step[k, 0]).mid() / (units.get(n, 1) + abs(at[n]))).mid() for k, n in enumerate(names)]
+        step = _solve_linear(jacobian(system, point, names), flint.arb_mat([[r.mid()] for r in system(point)]))
+        sizes = [(abs(step[k, 0]).mid() / (units.get(n, 1) + abs(point[n]))).mid() for k, n in enumerate(names)]
         for k, n in enumerate(names):
-            at[n] = (at[n] - step[k, 0]).mid()
-        if not all(at[n].is_finite() for n in names):
+            point[n] = (point[n] - step[k, 0]).mid()
+        if not all(point[n].is_finite() for n in names):
             break
         if all(s < tolerance for s in sizes):
-            return at
+            return point
     raise ProofFailed(
         "Newton's method finds no solution near the design: the equations are singular there, or it is no solution"
     )
@@ -86,7 +86,7 @@ def _solve_linear(matrix: Any, right: Any) -> Any:
 def enclose_solution(
     system: System, middle: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = Table()
 ) -> Enclosure:
-    """Enclose the solution near a midpoint that is right to `digits`.
+    """Enclose the solution near a midpoint that is correct to `digits` digits.
 
     The smallest box that proves the solution gives the balls, the largest one the uniqueness.
 

@@ -1,4 +1,4 @@
-"""Arrays of numbers with error bounds, which every operation propagates."""
+"""Arrays of numbers with error bounds; every operation computes the error bound of its result."""
 
 import math
 from collections.abc import Callable
@@ -13,12 +13,12 @@ from tmsopt.records import Array, Truth
 UNIT = 2 * np.finfo(float).eps
 """Relative rounding error of one operation, doubled to cover the rounding of the bounds themselves."""
 
-_LARGEST_POWER = 64  # exponent up to which a power is a product
-_LARGEST_TANGENT_CHANGE = 0.1  # relative change of a tangent within its error, for which the slope bound holds
+_LARGEST_POWER = 64  # largest exponent for which a power is a product
+_LARGEST_TANGENT_CHANGE = 0.1  # largest relative change of a tangent within its error for which the slope bounds it
 
 
 def _make_lipschitz(function: Callable[[Any], Any]) -> Callable[["Bounded"], "Bounded"]:
-    """A function on bounded numbers, for a function whose slope is at most 1 everywhere."""
+    """The version for bounded numbers of a function whose slope is at most 1 everywhere."""
     return lambda x: add_rounding(function(x.value), x.error)
 
 

@@ -1,4 +1,4 @@
-"""Runs from a start to the nearest point of one edge, with solvers shared by all designs of a model."""
+"""Finds the nearest point of one edge from a start. All designs of a model share the compiled NLP of an edge."""
 
 import math
 from collections.abc import Callable
@@ -18,22 +18,22 @@ from tmsopt.records import Array
 SAME_DISTANCE = 1e-9
 """Relative difference below which distances count as equal."""
 
-_ITERATIONS, _UNFINISHED = 200, "Maximum_Iterations_Exceeded"
+_ITERATIONS, _UNFINISHED = 200, "Maximum_Iterations_Exceeded"  # largest number, and the status if it is reached
 _FEASIBLE = 1e-10  # largest violation, in scaled coefficients, of a point on the edge
-_STATIONARY = 1e-8
-_SHIFTED = 1e-8  # largest share of the squared distance that the violation, times its multiplier, may shift
-_KEPT = 64  # programs, one per edge and model
+_STATIONARY = 1e-8  # largest gradient of the Lagrangian at a nearest point
+_SHIFTED = 1e-8  # largest change of the squared distance, relative to it, that the violation can cause
+_MAX_PROGRAMS = 64  # in the cache, one for each edge and model
 _WEIGHT, _SCALE, _SIZE, _SIGN = "weight of ", "scale ", "size ", "sign of a0"
 """Names of the numbers of a program other than the parameters, whose names have no blanks."""
 
 
 @dataclass(frozen=True)
 class EdgePoint:
-    """The end of one run, as a displacement u in weights.
+    """The point at which one run of a solver ends, as a displacement u in units of the weights.
 
     Attributes:
-        refined: whether the conditions of a nearest point hold to rounding. They do not if a violation, times its
-            multiplier, still shifts the distance, as near roots of multiplicity 5 or 6.
+        refined: whether the conditions of a nearest point hold to rounding. Near roots of multiplicity 5 or 6 they may
+            not: there a small violation of the equations still changes the distance.
     """
 
     u: Array = field(default_factory=lambda: np.zeros(0))
@@ -41,7 +41,7 @@ class EdgePoint:
 
     @property
     def distance(self) -> float:
-        """√Σ u²; inf for no point."""
+        """√Σ u²; inf if there is no point."""
         return float(np.linalg.norm(self.u)) if self.u.size else math.inf
 
 
@@ -52,7 +52,7 @@ Method = Callable[..., Callable[[Array], Run]]
 def make_approach(
     base: WeightedDesign, edge: Edge, sign: float, size: float, method: Method
 ) -> Callable[[Array, EdgePoint], EdgePoint]:
-    """A function (start, best so far) → the nearest point of an edge; it returns the best if the run ends elsewhere.
+    """A function (start, best point so far) → the nearest point of an edge, or the best point if the run fails.
 
     Args:
         sign: sign of a0 on the side of the edge that is stable or heavily damped.
@@ -60,13 +60,13 @@ def make_approach(
     """
     n = len(base.weights)
     template = _nlp(base.problem.model, base.problem.parameter_set.name, tuple(base.weights), edge)
-    own = [base.parameters[name] for name in base.problem.parameter_set.names]
-    own += [*base.weights.values(), *base.scale.tolist(), *base.sizes.tolist(), sign, size]
+    numbers = [base.parameters[name] for name in base.problem.parameter_set.names]
+    numbers += [*base.weights.values(), *base.scale.tolist(), *base.sizes.tolist(), sign, size]
     nlp = replace(
         template,
         lower=(*(base.lower / size).tolist(), *template.lower[n:]),
         upper=(*(base.upper / size).tolist(), *template.upper[n:]),
-        numbers=dict(zip(template.formula.names[len(template.variables) :], own, strict=True)),
+        numbers=dict(zip(template.formula.names[len(template.variables) :], numbers, strict=True)),
     )
     run, polish = method(nlp, max_iterations=_ITERATIONS), make_polisher(nlp)
 
@@ -75,7 +75,7 @@ def make_approach(
         if not (np.all(np.isfinite(c)) and c.any()):
             return best
         run_end = run(np.concatenate([u / size, edge.guess(c)]))
-        if not best.u.size and run_end.status == _UNFINISHED:  # no point yet: continue
+        if not best.u.size and run_end.status == _UNFINISHED:  # continue the run, because there is no point yet
             run_end = run(run_end.x)
         if float(np.linalg.norm(run_end.x[:n])) * size >= best.distance * (1 - SAME_DISTANCE):
             return best
@@ -89,23 +89,24 @@ def make_approach(
     return solve_from
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_MAX_PROGRAMS)
 def _nlp(model: Model, set_name: str, weighted: tuple[str, ...], edge: Edge) -> NLP:
-    """Minimise y·y, y = u/size, over displacements and the unknowns of the edge; the same NLP for every design.
+    """Minimise y·y with y = u/size over the displacements u and the unknowns of the edge, for every design.
 
-    Its numbers are the parameters, the weights, the scales and sizes of the coefficients, the sign of a0, and the size.
+    The numbers of the NLP are the parameters, the weights, the scales and sizes of the coefficients, the sign of a0,
+    and the size.
     """
     parameter_set, n, extra = model.parameter_set(set_name), len(weighted), len(edge.unknowns)
     x = [symbol(variable_name(k)) for k in range(n + extra)]
     numbers = [*parameter_set.names, *(_WEIGHT + name for name in weighted)]
     numbers += [f"{kind}{k}" for kind in (_SCALE, _SIZE) for k in range(model.degree + 1)] + [_SIGN, _SIZE]
-    given = {name: symbol(name) for name in numbers}
+    symbols = {name: symbol(name) for name in numbers}
     displaced = {
-        name: given[name] + given[_WEIGHT + name] * given[_SIZE] * y for name, y in zip(weighted, x, strict=False)
+        name: symbols[name] + symbols[_WEIGHT + name] * symbols[_SIZE] * y for name, y in zip(weighted, x, strict=False)
     }
-    a = model.coefficients({name: displaced.get(name, given[name]) for name in parameter_set.names}, parameter_set)
-    c = [given[_SIGN] * coefficient / given[f"{_SCALE}{k}"] for k, coefficient in enumerate(a)]
-    equations = [e / given[f"{_SIZE}{k}"] for k, e in edge.equations(c, x[n:]).items()]
+    a = model.coefficients({name: displaced.get(name, symbols[name]) for name in parameter_set.names}, parameter_set)
+    c = [symbols[_SIGN] * coefficient / symbols[f"{_SCALE}{k}"] for k, coefficient in enumerate(a)]
+    equations = [e / symbols[f"{_SIZE}{k}"] for k, e in edge.equations(c, x[n:]).items()]
     inequalities = edge.nonnegative(x[n:])
     rows = [*equations, *inequalities]
     return NLP(

@@ -1,4 +1,4 @@
-"""Whether a design is already on a stability boundary, up to the rounding of its parameters."""
+"""Decides whether a design is on a stability boundary, up to the rounding of its parameters."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,26 +14,28 @@ from tmsopt.records import Array, Numbers
 from tmsopt.roots import Root, Structure, exact_longest, lienard_chipart, rebuilt, structure
 from tmsopt.roots.exact import isolated_roots
 
-_ROUNDING = 64 * float(np.finfo(float).eps)  # of the terms of a coefficient: error of a solver and of numeric roots
-_FAR = 1e-3  # of the largest root: a larger abscissa is not on an edge
-_ON_LINE = 1e-6  # of the largest root: a larger real part is not rounding
+_ROUNDING = 64 * float(
+    np.finfo(float).eps
+)  # error of a solver and of numeric roots, relative to the terms of a coefficient
+_FAR = 1e-3  # a design with a larger |abscissa|, relative to the largest root, is on no edge
+_ON_LINE = 1e-6  # a real part that is larger, relative to the largest root, is no rounding error
 
 
 def edges_at(problem: Posed, parameters: Numbers) -> tuple[str, ...]:
     """The stability boundaries that a design is on up to rounding: weave, capsize, infinity.
 
-    Empty if a root is right of the imaginary axis. The test moves roots onto the axis, or the leading coefficient to 0,
-    and compares the change of the coefficients with the rounding of the parameters.
+    The result is empty if a root is right of the imaginary axis. The test moves roots onto the axis, or the leading
+    coefficient to 0, and compares the change of the coefficients with the rounding of the parameters.
     """
     values = problem.values(parameters)
     c, errors = np.array([float(x) for x in values.coefficients]), np.array(values.roundings())
-    known = np.abs(c) > errors
-    if not np.all(np.isfinite(c)) or not known[:-1].any():
+    is_nonzero = np.abs(c) > errors
+    if not np.all(np.isfinite(c)) or not is_nonzero[:-1].any():
         return ()
-    lead = int(np.argmax(known))
-    found: Structure = structure(c[lead:], off=errors[lead:]) if lead else values["structure"]
-    on_axis = _classify_axis_roots(found.roots, errors[lead:] / abs(c[lead]))
-    if on_axis and problem.model.carrier is not None:  # a zero root is an ordinary real eigenfrequency
+    lead = int(np.argmax(is_nonzero))
+    nearby: Structure = structure(c[lead:], off=errors[lead:]) if lead else values["structure"]
+    on_axis = _classify_axis_roots(nearby.roots, errors[lead:] / abs(c[lead]))
+    if on_axis and problem.model.carrier is not None:  # a root 0 is a real eigenfrequency like any other
         on_axis = ("weave",)
     return () if on_axis is None else (*on_axis, *(["infinity"] if lead else []))
 
@@ -48,10 +50,11 @@ def find_edges(
 ) -> tuple[tuple[str, ...], bool]:
     """The stability boundaries that a design is on, and whether they and the growth on them are certain.
 
-    They are certain for simple roots that a located pattern places on the axis, and where exact fractions decide.
+    They are certain if a located pattern places simple roots on the axis, or if exact fractions decide.
 
     Args:
-        abscissa, meetings: of the design, in doubles.
+        optimal: whether the status is optimal, so that the design has the patterns that the problem locates.
+        abscissa, meetings: the abscissa and the multiple roots of the design, in doubles.
     """
     right_of_axis = beyond_axis(problem.model, problem.located if optimal else (), structure.roots)
     largest = max((r.size for r in structure.roots), default=0.0)
@@ -66,34 +69,34 @@ def find_edges(
 def find_longest_chain(problem: Posed, parameters: Numbers) -> int | None:
     """Length of the longest Jordan chain of a root on the imaginary axis, in exact fractions.
 
-    None if no root is on the axis, if one is right of it, or if fractions do not decide.
-    p(s) = e(s²) + s o(s²) has the roots s² = x of gcd(e, o) on the axis, mirrored in it, or in four quadrants.
+    The result is None if no root is on the axis, if one is right of it, or if fractions do not decide. For p(s) =
+    e(s²) + s o(s²), a root x of gcd(e, o) gives a pair of roots s = ±√x of p: on the axis if x is real and ≤ 0.
     """
-    model, of = problem.model, problem.parameter_set
+    model, parameter_set = problem.model, problem.parameter_set
     design = convert_as_typed(problem, parameters)
-    a = design.coefficients(model, of)
+    a = design.coefficients(model, parameter_set)
     if a is None or a[0] == 0:
         return None
     zeros = next(k for k, c in enumerate(a[::-1]) if c != 0)
     ascending = a[::-1][zeros:]
-    shared = flint.fmpq_poly(ascending[::2]).gcd(flint.fmpq_poly(ascending[1::2]))
-    squares: Any = (shared * shared.denom()).numer().complex_roots()
-    if zeros + shared.degree() < 1 or any(square[0].imag != 0 or square[0].real > 0 for square in squares):
+    divisor = flint.fmpq_poly(ascending[::2]).gcd(flint.fmpq_poly(ascending[1::2]))
+    squares: Any = (divisor * divisor.denom()).numer().complex_roots()
+    if zeros + divisor.degree() < 1 or any(square[0].imag != 0 or square[0].real > 0 for square in squares):
         return None
-    double = flint.fmpq_poly([c for x in shared.coeffs() for c in (x, flint.fmpq(0))])
-    rest = (flint.fmpq_poly(ascending) / double).coeffs()[::-1]
-    if not all(q > 0 for q in lienard_chipart([c / rest[0] for c in rest])):
+    double = flint.fmpq_poly([c for x in divisor.coeffs() for c in (x, flint.fmpq(0))])
+    cofactor = (flint.fmpq_poly(ascending) / double).coeffs()[::-1]
+    if not all(q > 0 for q in lienard_chipart([c / cofactor[0] for c in cofactor])):
         return None
     on_axis = double * flint.fmpq_poly([0] * zeros + [1])
     multiple = [(f, int(m)) for f, m in flint.fmpq_poly(a[::-1]).factor()[1] if m > 1 and (on_axis % f).is_zero()]
-    matrices = design.matrices(model, of) if multiple else None
+    matrices = design.matrices(model, parameter_set) if multiple else None
     if model.pencil is not None and multiple and matrices is None:
         return None
     return max((exact_longest(matrices, f, m) if matrices else m for f, m in multiple), default=1)
 
 
 def is_exactly_multiple(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> bool:
-    """Whether the roots have the multiplicities of the polynomial of the numbers as typed, in fractions."""
+    """Whether the polynomial in fractions, from the numbers as typed, has roots of these multiplicities."""
     a = convert_as_typed(problem, parameters).coefficients(problem.model, problem.parameter_set)
     if a is None or a[0] == 0:
         return False
@@ -107,14 +110,14 @@ def convert_as_typed(problem: Posed, parameters: Numbers) -> ExactDesign:
 
 
 def _classify_axis_roots(roots: Sequence[Root], errors: Array) -> tuple[str, ...] | None:
-    """Kinds of the roots on the imaginary axis, within the coefficients' errors; None if one is right of it."""
+    """Boundaries of the roots on the axis, up to errors of the coefficients; None if a root is right of the axis."""
     z = np.array([complex(r.re, r.im) for r in roots for _ in range(r.multiplicity)])
-    near = np.abs(z.real) <= _ON_LINE * np.abs(z).max(initial=0.0)
-    on_line = np.where(near, 1j * z.imag, z)
+    is_on_axis = np.abs(z.real) <= _ON_LINE * np.abs(z).max(initial=0.0)
+    on_line = np.where(is_on_axis, 1j * z.imag, z)
     change = np.abs(rebuilt(on_line) - rebuilt(z))
     if len(z) != len(errors) - 1 or np.any(change > errors + _ROUNDING * rebuilt(-np.abs(z).astype(complex))):
-        near[:] = False
-    if np.any(z.real[~near] >= 0):
+        is_on_axis[:] = False
+    if np.any(z.real[~is_on_axis] >= 0):
         return None
-    kinds = {"weave": near & (z.imag != 0), "capsize": near & (z.imag == 0)}
+    kinds = {"weave": is_on_axis & (z.imag != 0), "capsize": is_on_axis & (z.imag == 0)}
     return tuple(kind for kind, mask in kinds.items() if mask.any())

@@ -1,7 +1,7 @@
 """The boundaries of stability and of heavy damping in factored form, without division by a0.
 
-Coefficients c here are multiplied by the sign of a0 on the stable side; all are positive if the roots are left of the
-imaginary axis. Every form stays regular where a0 vanishes.
+The coefficients c in this module are multiplied by the sign that a0 has on the stable side, so that all are positive if
+the roots are left of the imaginary axis. Every factored form stays regular where a0 vanishes.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,72 +17,22 @@ from tmsopt.roots import discriminant, is_stable, product, real_roots, rebuilt, 
 EDGE_TOLERANCE = 1e-10
 """A polynomial within this relative change of its coefficients counts as on an edge."""
 
-_LEAD = 1e-9  # of the largest coefficient: smallest leading coefficient for computing roots
-_SMALL = 1e-3
-
-
-@dataclass(frozen=True)
-class Cofactor:
-    """All polynomials of a degree without roots in Re s > 0, by their factors; if `real`, with real roots only.
-
-    Above degree 2 the linear factor, if any, is f s + 1 − f. The first quadratic factor has any size; the others are
-    a s² + b s + 1 − a − b.
-    """
-
-    degree: int
-    real: bool
-
-    @property
-    def unknowns(self) -> dict[str, float]:
-        """Names of the factor coefficients, each ≥ 0, and their upper bounds."""
-        more = {f"{letter}{k}": 1.0 for k in range(1, self.degree // 2) for letter in "ab"}
-        return dict.fromkeys("f" * self._odd, 1.0) | dict.fromkeys("ABC"[: self.degree + 1], np.inf) | more
-
-    @property
-    def _odd(self) -> int:
-        """Number of linear factors before the first quadratic one."""
-        return self.degree % 2 if self.degree > 2 else 0
-
-    def factors(self, u: Sequence[Any]) -> list[list[Any]]:
-        """Coefficients of each factor, from the unknowns."""
-        more = self._odd + 3
-        linear, scaled = u[: self._odd], ([u[k], u[k + 1], 1 - u[k] - u[k + 1]] for k in range(more, len(u), 2))
-        return [*([f, 1 - f] for f in linear), list(u[self._odd : more]), *scaled]
-
-    def nonnegative(self, u: Sequence[Any]) -> list[Any]:
-        """Expressions of the unknowns that must be ≥ 0."""
-        quadratics = [factor for factor in self.factors(u) if len(factor) == 3]
-        return [c for _, _, c in quadratics[1:]] + ([b * b - 4 * a * c for a, b, c in quadratics] if self.real else [])
-
-    def guess(self, c: Array) -> list[float]:
-        """Unknowns near numeric coefficients: quadratics pair neighbouring roots; the rightmost real root is linear."""
-        if self.degree <= 2:
-            return list(c.tolist())
-        found = roots(replace_small_lead(c))
-        linear: list[float] = []
-        if self._odd:
-            rightmost = max((z for z in found if z.imag == 0), key=lambda z: z.real)
-            linear = [1 / (1 + max(-float(rightmost.real), 0.0))]
-            found = np.delete(found, np.flatnonzero(found == rightmost)[0])
-        order = np.lexsort((found.imag, np.abs(found.imag), found.real, found.imag == 0))
-        z, w = found[order].reshape(-1, 2).T
-        nonnegative = np.maximum(np.stack([np.ones(len(z)), -(z + w).real, (z * w).real], axis=1), 0.0)
-        scaled = nonnegative / nonnegative.sum(axis=1, keepdims=True)
-        whole = np.array(product(*([x, 1 - x] for x in linear), *scaled), dtype=float)
-        size = max(float(whole @ c) / float(whole @ whole), 0.0)
-        return [*linear, *(size * scaled[0]).tolist(), *scaled[1:, :2].ravel().tolist()]
+_LEAD = 1e-9  # smallest leading coefficient for computing roots, relative to the largest coefficient
+_SMALL = 1e-3  # smallest size of a root in the sizes of terms, relative to the median root
 
 
 @dataclass(frozen=True)
 class Edge:
-    """A piece of a boundary: the multiples of a divisor by a `Cofactor`, with unknowns ≥ 0.
+    """A piece of a boundary: all multiples of a divisor by a cofactor without roots in Re s > 0, given by its factors.
 
-    A divisor with an unknown root is e s² + 1 − e, or e s + 1 − e squared; its root is at infinity for e = 0.
+    A divisor with an unknown root is e s² + 1 − e, or e s + 1 − e squared; its root is at infinity for e = 0. A
+    cofactor of odd degree above 2 has one linear factor f s + 1 − f. Its first quadratic factor has any size; the
+    others are a s² + b s + 1 − a − b. All unknowns are ≥ 0.
 
     Attributes:
         name: ``weave``, ``capsize``, ``infinity``, ``EP2``; ``capsize, real`` and ``infinity, real`` if all other roots
             are real; ``real`` for heavy damping itself, approached from outside.
-        real: whether the other roots are real; else they are not right of the axis.
+        real: whether the roots of the cofactor are real; else they are not right of the axis.
         divisor: the divisor as a function of e.
         candidates: values of e for numeric coefficients; None for a divisor without e.
     """
@@ -95,47 +45,79 @@ class Edge:
 
     @property
     def unknowns(self) -> dict[str, float]:
-        """Names of the factor coefficients and their upper bounds."""
-        return dict.fromkeys("e" * self._own, 1.0) | self._cofactor.unknowns
+        """Names of the unknowns and their upper bounds."""
+        degree = self._cofactor_degree
+        scaled = [f"{letter}{k}" for k in range(1, degree // 2) for letter in "ab"]
+        return dict.fromkeys(self._roots, 1.0) | dict.fromkeys("ABC"[: degree + 1], np.inf) | dict.fromkeys(scaled, 1.0)
 
     @property
-    def _cofactor(self) -> Cofactor:
-        return Cofactor(self.degree + 1 - len(self.divisor(0.0)), self.real)
+    def _cofactor_degree(self) -> int:
+        return self.degree + 1 - len(self.divisor(0.0))
 
     @property
-    def _own(self) -> int:
-        return int(self.candidates is not None)
+    def _roots(self) -> str:
+        """Unknowns e and f of the root of the divisor and of the linear factor, if there are any."""
+        degree = self._cofactor_degree
+        return "e" * (self.candidates is not None) + "f" * (degree > 2 and degree % 2)
+
+    def factors(self, u: Sequence[Any]) -> list[list[Any]]:
+        """The divisor and each factor of the cofactor, from the unknowns."""
+        root_values = dict(zip(self._roots, u, strict=False))
+        first = len(root_values)
+        linear = [[f, 1 - f] for name, f in root_values.items() if name == "f"]
+        scaled = [[u[k], u[k + 1], 1 - u[k] - u[k + 1]] for k in range(first + 3, len(u), 2)]
+        return [self.divisor(root_values.get("e", 0.0)), *linear, list(u[first : first + 3]), *scaled]
 
     def equations(self, c: Sequence[Any], u: Sequence[Any]) -> dict[int, Any]:
         """Index of a coefficient → an expression of coefficients and unknowns that must be 0."""
-        whole = product(self.divisor(u[0] if self._own else 0.0), *self._cofactor.factors(u[self._own :]))
-        return {k: a - b for k, (a, b) in enumerate(zip(c, whole, strict=True))}
+        return {k: a - b for k, (a, b) in enumerate(zip(c, product(*self.factors(u)), strict=True))}
 
     def nonnegative(self, u: Sequence[Any]) -> list[Any]:
         """Expressions of the unknowns that must be ≥ 0: the other roots are not right of the axis, or are real."""
-        return self._cofactor.nonnegative(u[self._own :])
+        quadratics = [factor for factor in self.factors(u)[1:] if len(factor) == 3]
+        return [c for _, _, c in quadratics[1:]] + ([b * b - 4 * a * c for a, b, c in quadratics] if self.real else [])
 
     def guess(self, c: Array) -> list[float]:
-        """The e whose divisor divides c best, and the unknowns of the quotient."""
+        """Unknowns near numeric coefficients.
+
+        The divisor is the candidate that divides c best. The quadratic factors of the quotient have pairs of
+        neighbouring roots, and the linear factor has the rightmost real root.
+        """
         size = measure_terms(c)
 
-        def cofactor(e: float) -> Array:
+        def quotient(e: float) -> Array:
             return divide_nearly(c, np.array(self.divisor(e)), size)
 
         def mismatch(e: float) -> float:
-            return float(np.abs((c - np.convolve(self.divisor(e), cofactor(e))) / size).max())
+            return float(np.abs((c - np.convolve(self.divisor(e), quotient(e))) / size).max())
 
         best = min(self.candidates(c) if self.candidates else [0.0], key=mismatch)
-        return [best] * self._own + self._cofactor.guess(cofactor(best))
+        cofactor, guess = quotient(best), [best] * (self.candidates is not None)
+        if len(cofactor) <= 3:
+            return [*guess, *cofactor.tolist()]
+        z = roots(replace_small_lead(cofactor))
+        linear: list[list[float]] = []
+        if "f" in self._roots:
+            rightmost = max((s for s in z if s.imag == 0), key=lambda s: s.real)
+            f = 1 / (1 + max(-float(rightmost.real), 0.0))
+            linear, guess = [[f, 1 - f]], [*guess, f]
+            z = np.delete(z, np.flatnonzero(z == rightmost)[0])
+        order = np.lexsort((z.imag, np.abs(z.imag), z.real, z.imag == 0))
+        first, second = z[order].reshape(-1, 2).T
+        nonnegative = np.maximum(np.stack([np.ones(len(first)), -(first + second).real, (first * second).real], 1), 0.0)
+        scaled = nonnegative / nonnegative.sum(axis=1, keepdims=True)
+        whole = np.array(product(*linear, *scaled), dtype=float)
+        factor = max(float(whole @ cofactor) / float(whole @ whole), 0.0)
+        return [*guess, *(factor * scaled[0]).tolist(), *scaled[1:, :2].ravel().tolist()]
 
 
 @lru_cache(maxsize=16)
 def list_edges(degree: int) -> Table[Edge]:
-    """Every piece of a boundary for polynomials of a degree ≥ 2, by name.
+    """All pieces of the boundaries for polynomials of a degree ≥ 2, by name.
 
-    From outside heavy damping, the nearest polynomial with real roots is on one edge or on several.
+    For a polynomial that is not heavily damped, the nearest one with real roots alone is on one edge or on several.
     """
-    every = (
+    edges = (
         Edge("weave", degree, False, lambda e: [e, 0, 1 - e], _pairs),
         Edge("capsize", degree, False, lambda e: [1, 0]),
         Edge("infinity", degree, False, lambda e: [0, 1]),
@@ -144,17 +126,17 @@ def list_edges(degree: int) -> Table[Edge]:
         Edge("infinity, real", degree, True, lambda e: [0, 1]),
         Edge("real", degree, True, lambda e: [1]),
     )
-    return Table({edge.name: edge for edge in every})
+    return Table({edge.name: edge for edge in edges})
 
 
 def _pairs(c: Array) -> list[float]:
-    """Each pair as if it were on the axis."""
+    """The values of e of the divisor e s² + 1 − e, as if each pair were on the axis."""
     z = roots(replace_small_lead(c))
     return [float(1 / (1 + abs(x) ** 2)) for x in z[z.imag > 0]] + [0.0, 1.0]
 
 
 def _doubles(c: Array) -> list[float]:
-    """Each two neighbours as if they were equal."""
+    """The values of e of the divisor (e s + 1 − e)², as if two neighbouring roots were equal."""
     z = roots(replace_small_lead(c))
     real = np.sort(z[z.imag == 0].real)
     doubles = [*((real[1:] + real[:-1]) / 2), *z[z.imag > 0].real]
@@ -164,8 +146,9 @@ def _doubles(c: Array) -> list[float]:
 def is_heavily_damped(c: Array) -> Truth:
     """Whether all roots are real, negative and distinct, for coefficients of shape (…, n + 1), up to rounding.
 
-    A quartic has four distinct real roots where Δ > 0, 8 c0 c2 < 3 c1² and 64 c0³ c4 − 16 c0² c2² + 16 c0 c1² c2 −
-    16 c0² c1 c3 − 3 c1⁴ < 0; a cubic or a quadratic has all roots real where Δ > 0; higher degrees are counted.
+    A quartic has four distinct real roots if Δ > 0, 8 c0 c2 < 3 c1² and 64 c0³ c4 − 16 c0² c2² + 16 c0 c1² c2 −
+    16 c0² c1 c3 − 3 c1⁴ < 0. A cubic or a quadratic has only real roots if Δ > 0. For higher degrees the real roots are
+    counted.
     """
     columns, damped = [*np.moveaxis(c, -1, 0)], np.asarray(is_stable(c, exact=False))
     if len(columns) > 5:
@@ -190,7 +173,7 @@ def _has_all_real_roots(c: Array, stable: Truth) -> Truth:
 
 
 def find_crossed_edges(c: Array, heavy: bool) -> tuple[str, ...]:
-    """The edges between a polynomial just beyond them and the other side, whose sign c has."""
+    """The edges that a polynomial just outside has crossed; c has the sign of a0 on the inner side."""
     crossed = [n for n, k in (("capsize", -1), ("infinity", 0)) if c[k] <= 0]
     if heavy:
         return tuple(f"{n}, real" for n in crossed) or ("EP2",)
@@ -198,17 +181,17 @@ def find_crossed_edges(c: Array, heavy: bool) -> tuple[str, ...]:
 
 
 def replace_small_lead(c: Array) -> Array:
-    """The coefficients with a leading one that is large enough for computing roots."""
+    """The coefficients, with the leading one made large enough for computing roots."""
     size = float(np.abs(c).max()) or 1.0
     return np.concatenate([[c[0] if abs(c[0]) > _LEAD * size else _LEAD * size], c[1:]])
 
 
 def measure_terms(c: Array) -> Array:
-    """Size of the terms that each coefficient sums; a root at 0 counts as a thousandth of the median."""
+    """Size of the terms whose sum is each coefficient; a root at 0 counts as a thousandth of the median root."""
     lead = replace_small_lead(c)
     radius = np.abs(roots(lead))
-    least = _SMALL * (float(np.median(radius)) or 1.0)  # 1 if all are 0
-    return np.asarray(abs(lead[0]) * rebuilt(-np.maximum(radius, least).astype(complex)))
+    min_size = _SMALL * (float(np.median(radius)) or 1.0)  # 1 if all are 0
+    return np.asarray(abs(lead[0]) * rebuilt(-np.maximum(radius, min_size).astype(complex)))
 
 
 def divide_nearly(c: Array, factor: Array, size: Array) -> Array:

@@ -1,7 +1,7 @@
-"""Checks in exact arithmetic that a boundary point is one.
+"""Checks in exact arithmetic that a point that a solver found is on a boundary.
 
-An optimiser can satisfy the equations at points around which nothing changes: where coefficients are differences of
-large numbers, or all vanish together.
+A solver can satisfy the equations of a boundary at points around which stability does not change: where coefficients
+are differences of large numbers, or where all coefficients vanish.
 """
 
 from collections.abc import Iterator
@@ -17,21 +17,22 @@ from tmsopt.records import Array, Numbers
 from tmsopt.roots import exact_roots, is_stable, multiple_real_roots, routh, shift
 
 BITS = 400
-"""Precision of the balls that decide signs; an undecided sign counts as 0."""
+"""Precision in bits of the intervals that decide signs; an undecided sign counts as 0."""
 
-_REACHES = (1e-6, 1e-4, 1e-2)  # of the distance: radii around a point at which stability is tested
-_LEAST = 1e-9  # of the weights: smallest change that doubles resolve
-_FEW = 4  # designs per radius that exact arithmetic tests
-_SHIFTS, _NEAR = (1e-4, 1e-3, 1e-2), 0.05  # shift of the roots, of their size; largest displacement, of the distance
-_ROUNDS, _STEP = 4, 1e-6
-_NONE = 1e-10  # of the terms of the design's coefficients: smaller coefficients count as 0
+_REACHES = (1e-6, 1e-4, 1e-2)  # radii around a point at which stability is tested, relative to its distance
+_MIN_RADIUS = 1e-9  # smallest change that doubles resolve, in weights
+_MAX_TESTS = 4  # designs for each radius that exact arithmetic tests
+_SHIFTS, _NEAR = (1e-4, 1e-3, 1e-2), 0.05  # shifts of the roots; largest displacement, relative to the distance
+_ROUNDS, _STEP = 4, 1e-6  # Gauss–Newton steps; step of their finite differences
+_NONE = 1e-10  # a coefficient below this part of its terms counts as 0
 
 
 def is_boundary(base: WeightedDesign, u: Array, heavy: bool) -> bool:
     """Whether a displacement leads to a change of stability, or to the edge of heavy damping.
 
-    Designs next to the point must differ in stability from the design itself, in ball arithmetic. From outside, the
-    edge of heavy damping may be the tip of a cusp; real and negative roots at the point suffice there.
+    Exact arithmetic must find a design next to the point whose stability differs from that of the design itself. The
+    edge of heavy damping may be the tip of a cusp for a design outside it; then it suffices that all roots at the point
+    are real and negative.
     """
     c = base.coefficients(u)
     if not u.any():
@@ -50,23 +51,23 @@ def is_boundary(base: WeightedDesign, u: Array, heavy: bool) -> bool:
 
 
 def _find_changes_nearby(base: WeightedDesign, u: Array, heavy: bool, own_verdict: bool) -> Iterator[Array]:
-    """Displacements near u at which doubles find the other verdict."""
+    """Displacements near u at which the test in doubles differs from the verdict for the design itself."""
     size = float(np.linalg.norm(u))
-    around = np.concatenate([[u / size, -u / size], list_directions(base)])
+    rays = np.concatenate([[u / size, -u / size], list_directions(base)])
     for reach in _REACHES:
-        points = np.clip(u + max(reach * size, _LEAST) * around, base.lower, base.upper)
-        at = base.coefficients(points)
-        verdict = is_heavily_damped(np.sign(at[:, :1]) * at) if heavy else is_stable(at, exact=False)
-        yield from points[np.flatnonzero(verdict != own_verdict)[:_FEW]]
+        points = np.clip(u + max(reach * size, _MIN_RADIUS) * rays, base.lower, base.upper)
+        c = base.coefficients(points)
+        verdict = is_heavily_damped(np.sign(c[:, :1]) * c) if heavy else is_stable(c, exact=False)
+        yield from points[np.flatnonzero(verdict != own_verdict)[:_MAX_TESTS]]
     if not heavy and not own_verdict:  # towards a corner with a multiple root, stable designs are few
         yield from (
             v for left in _SHIFTS if np.linalg.norm((v := _shift_roots_left(base, u, left)) - u) <= _NEAR * size
         )
 
 
-def _shift_roots_left(base: WeightedDesign, u: Array, left: float) -> Array:
-    """A displacement that moves all roots left, those at infinity too, by Gauss–Newton steps."""
-    target = shift(shift(base.coefficients(u).tolist(), left)[::-1], left)[::-1]
+def _shift_roots_left(base: WeightedDesign, u: Array, step: float) -> Array:
+    """A displacement that moves all roots left by a step, roots at infinity too; found by Gauss–Newton steps."""
+    target = shift(shift(base.coefficients(u).tolist(), step)[::-1], step)[::-1]
     v = u
     for _ in range(_ROUNDS):
         steps = _STEP * np.eye(len(u))
@@ -77,7 +78,7 @@ def _shift_roots_left(base: WeightedDesign, u: Array, left: float) -> Array:
 
 
 def is_exactly_stable(problem: Posed, parameters: Numbers) -> bool:
-    """Whether all roots of the design as stored are left of the imaginary axis, in ball arithmetic."""
+    """Whether all roots of the design as stored are proved to be left of the imaginary axis, by intervals."""
     with flint.ctx.workprec(BITS):
         c = _balls(problem, parameters)
         return all(x * c[0] > 0 for x in routh(c))
@@ -92,5 +93,5 @@ def _has_negative_real_roots(problem: Posed, parameters: Numbers) -> bool:
 
 
 def _balls(problem: Posed, parameters: Numbers) -> list[flint.arb]:
-    at = {n: flint.arb(float(x)) for n, x in parameters.items()}
-    return [flint.arb(c) for c in problem.model.coefficients(at, problem.parameter_set)]
+    balls = {n: flint.arb(float(x)) for n, x in parameters.items()}
+    return [flint.arb(c) for c in problem.model.coefficients(balls, problem.parameter_set)]

@@ -1,4 +1,4 @@
-"""The nearest point of each boundary: how far a design may change before it loses stability or heavy damping."""
+"""Finds the nearest point of each boundary: how far a design may change before it loses stability or heavy damping."""
 
 import math
 from collections.abc import Sequence
@@ -34,9 +34,9 @@ STABILITY = ("weave", "capsize", "infinity")
 KINDS = (*STABILITY, "heavy damping")
 """All boundaries; the boundary of heavy damping has several edges."""
 
-_ROUNDS = 3
-_KEPT = 256  # designs
-_NOTHING, _SHIFT = 1e-12, 1e-3  # of a weight: largest value that counts as 0; trial change
+_ROUNDS = 3  # of runs from the crossings on the segment to the best point so far
+_MAX_DESIGNS = 256  # in the cache
+_NOTHING, _SHIFT = 1e-12, 1e-3  # largest value that counts as 0, and a trial change; both relative to the weight
 
 
 @dataclass(frozen=True, repr=False)
@@ -50,7 +50,7 @@ class Nearest(Printable):
         direction: (x − x0)/weight of each parameter that has a weight.
         refined: whether the point satisfies the conditions of a locally nearest point to rounding; else it is the best
             crossing found. It is the nearest point found; a nearer one elsewhere is not excluded.
-        direct: whether the straight way there crosses no boundary before its end.
+        direct: whether the segment from the design to the point crosses no boundary before its end.
 
     Example:
         >>> swing = tmsopt.Problem(tmsopt.models.from_coefficients([1, "c", "k"]), fixed={"c": 1.0, "k": 4.0})
@@ -217,7 +217,7 @@ def find_stability_margins(problem: Posed, parameters: Numbers) -> Robustness:
     return _measure_margins(problem, Table(parameters), Table(problem.weights))
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_MAX_DESIGNS)
 def _measure_margins(problem: Posed, parameters: Table[float], weights: Table[float]) -> Robustness:
     return _survey_boundaries(weight_design(problem, parameters, weights or None), STABILITY, make_sqp)
 
@@ -225,33 +225,33 @@ def _measure_margins(problem: Posed, parameters: Table[float], weights: Table[fl
 def _survey_boundaries(base: WeightedDesign, kinds: Sequence[str] = KINDS, method: Method = make_ipopt) -> Robustness:
     with_damping = "heavy damping" in kinds
     crossings = find_ray_crossings(base, with_damping)
-    found = [_nearest(base, crossings, kind, method) for kind in kinds]
-    limit = min((n for n in found if n.kind in STABILITY), key=lambda n: n.distance)
-    if limit.found and not limit.direct:  # another boundary is nearer, but no ray crossed it
+    points = [_nearest(base, crossings, kind, method) for kind in kinds]
+    limit = min((n for n in points if n.kind in STABILITY), key=lambda n: n.distance)
+    if limit.found and not limit.direct:  # a nearer crossing is on the segment, but no ray met it
         u = np.array([limit.direction[n] for n in base.weights])
         crossings = sorted([*crossings, *find_crossings_on_segment(base, u, with_damping)], key=lambda c: c.distance)
-        found = [_nearest(base, crossings, kind, method) for kind in kinds]
+        points = [_nearest(base, crossings, kind, method) for kind in kinds]
     stable = base.stable and not base.edges
-    own = Table(base.parameters), Table(base.weights)
+    design_tables = Table(base.parameters), Table(base.weights)
     zeros = _find_stabilising_zeros(base) if base.edges else ()
-    return Robustness(base.problem.problem, stable, base.edges, zeros, base.heavily_damped, *own, *found)
+    return Robustness(base.problem.problem, stable, base.edges, zeros, base.heavily_damped, *design_tables, *points)
 
 
 def _find_stabilising_zeros(base: WeightedDesign) -> tuple[str, ...]:
-    """Parameters at 0 each of which alone makes the design stable when it is changed."""
-    own = base.parameters
+    """Parameters that are 0; the design becomes stable if any one of them changes."""
+    parameters = base.parameters
     return tuple(
         n
         for n, weight in base.weights.items()
-        if abs(own[n]) <= _NOTHING * weight
-        and any(is_exactly_stable(base.problem, {**own, n: moved * weight}) for moved in (_SHIFT, -_SHIFT))
+        if abs(parameters[n]) <= _NOTHING * weight
+        and any(is_exactly_stable(base.problem, {**parameters, n: shift * weight}) for shift in (_SHIFT, -_SHIFT))
     )
 
 
 def _weight_given_design(design: Given, parameters: Numbers | None, weights: Numbers | None) -> WeightedDesign:
     problem = pose(design)
-    given = {"parameters": (parameters, "{'Fr': 1.2, 'mu': 0.1}"), "weights": (weights, "{'lambda_s': 0.01}")}
-    if faults := [f for n, (x, example) in given.items() if x is not None for f in table_faults(n, x, example)]:
+    tables = {"parameters": (parameters, "{'Fr': 1.2, 'mu': 0.1}"), "weights": (weights, "{'lambda_s': 0.01}")}
+    if faults := [f for n, (x, example) in tables.items() if x is not None for f in table_faults(n, x, example)]:
         raise InputError(faults)
     if weights is None and problem.weights:
         weights = problem.weights
@@ -264,49 +264,53 @@ def _weight_given_design(design: Given, parameters: Numbers | None, weights: Num
 
 
 def _nearest(base: WeightedDesign, crossings: list[RayCrossing], kind: str, method: Method = make_ipopt) -> Nearest:
-    """The nearest point over all pieces of one boundary; into heavy damping also from starts without a crossing."""
+    """The nearest point over all pieces of one boundary; for the way into heavy damping, starts need no crossing."""
     heavy = kind == "heavy damping"
-    if base.problem.model.carrier is not None and kind != "weave":  # eigenfrequencies can only cross the real line
+    if base.problem.model.carrier is not None and kind != "weave":  # an eigenfrequency can only cross the real line
         return Nearest(kind)
     if kind in base.edges or (heavy and base.is_on_damping_edge):
         zero = dict.fromkeys(base.weights, 0.0)
         return Nearest(kind, 0.0, Table(base.parameters), Table(zero), refined=True, direct=True)
-    own = [s for s in crossings if (s.edge not in STABILITY if heavy else s.edge == kind)]
+    edge_crossings = [s for s in crossings if (s.edge not in STABILITY if heavy else s.edge == kind)]
     starts: dict[tuple[str, float], list[Array]] = {}
-    for crossing in own:
+    for crossing in edge_crossings:
         starts.setdefault((crossing.edge, crossing.sign), []).append(crossing.u)
     if heavy and not base.heavily_damped:
         sign = float(np.sign(base.coefficients(np.zeros(len(base.weights)))[0]))
         starts.setdefault(("real", sign), []).extend(find_most_damped(base, sign))
     pieces = list_edges(base.problem.model.degree)
-    found = [_find_nearest_on_edge(base, pieces[edge], sign, points, method) for (edge, sign), points in starts.items()]
-    best = min([EdgePoint(), *found], key=lambda each: each.distance)
-    if own and own[0].distance < best.distance * (1 - SAME_DISTANCE):
-        best = EdgePoint(own[0].u, False)
+    ends = [_find_nearest_on_edge(base, pieces[edge], sign, points, method) for (edge, sign), points in starts.items()]
+    best = min([EdgePoint(), *ends], key=lambda each: each.distance)
+    if edge_crossings and edge_crossings[0].distance < best.distance * (1 - SAME_DISTANCE):
+        best = EdgePoint(edge_crossings[0].u, False)
     if not best.u.size or not is_boundary(base, best.u, heavy):
         return Nearest(kind)
     direct = not find_crossings_on_segment(base, best.u, heavy)
     direction = Table(dict(zip(base.weights, best.u.tolist(), strict=True)))
-    reached = {n: 0.0 if abs(x) <= _NOTHING * base.weights.get(n, 0.0) else x for n, x in base.design(best.u).items()}
-    return Nearest(kind, best.distance, Table(reached), direction, best.refined, direct)
+    parameters = {
+        n: 0.0 if abs(x) <= _NOTHING * base.weights.get(n, 0.0) else x for n, x in base.design(best.u).items()
+    }
+    return Nearest(kind, best.distance, Table(parameters), direction, best.refined, direct)
 
 
 def _find_nearest_on_edge(
     base: WeightedDesign, edge: Edge, sign: float, starts: list[Array], method: Method
 ) -> EdgePoint:
-    """The nearest end of runs from all starts; crossings on the way there are further starts."""
+    """The nearest end of runs from all starts; crossings on the segment to it are the starts of the next round."""
     best = EdgePoint()
     size = min((float(np.linalg.norm(u)) for u in starts if u.any()), default=1.0)
     run = make_approach(base, edge, sign, size, method)
     for round_number in range(_ROUNDS):
-        before = best.distance
+        last_distance = best.distance
         for u in starts:
             best = run(u, best)
         if not best.u.size:
             break
         crossings = find_crossings_on_segment(base, best.u, edge.real)
         starts = [c.u for c in crossings if (c.edge, c.sign) == (edge.name, sign)]
-        if edge.name == "real" and best.distance < before:  # no rays lead there, and similar starts end alike
+        if (
+            edge.name == "real" and best.distance < last_distance
+        ):  # no ray leads there, and similar starts end at the same point
             starts += draw_points(base, best.distance, round_number)
         if not starts:
             break

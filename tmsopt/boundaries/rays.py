@@ -15,12 +15,10 @@ from tmsopt.boundaries.weighted_design import WeightedDesign
 from tmsopt.records import Array, Truth
 from tmsopt.roots import is_stable, roots
 
-_DIRECTIONS = 1000
+_DIRECTIONS = 1000  # random rays
 _RADII = np.concatenate([[0.0], np.geomspace(1e-4, 4.0, 36)])
-_COARSE, _FINE = (
-    (16, 2),
-    (256, 6),
-)  # (parts, rounds) of the bracketing: for all crossings, and to full precision for the selected ones
+_COARSE, _FINE = (16, 2), (256, 6)
+"""(Parts, rounds) of the bracketing: for all crossings, and to full precision for the selected ones."""
 _MOST_CROSSINGS = 5  # of one edge
 _SAME_DIRECTION = 0.9  # cosine above which two directions count as one
 _RANDOM_STARTS = 4  # with 4, nearer points were found for 11 of 196 random systems of degrees 6 to 8; with 6, no more
@@ -64,25 +62,25 @@ def find_crossings_on_segment(base: WeightedDesign, u: Array, with_damping: bool
 def find_crossings(base: WeightedDesign, rays: Array, t: Array, with_damping: bool) -> list[RayCrossing]:
     """Crossings along the displacements t · ray, t ascending."""
     c = base.coefficients(base.clip_rays(rays[:, None, :], t))
-    found: list[RayCrossing] = []
+    crossings: list[RayCrossing] = []
     for heavy, test in ((False, _stable), (True, is_heavily_damped))[: 1 + with_damping]:
-        inside = test(c)
-        ray, step = np.nonzero(inside[:, 1:] != inside[:, :-1])
-        brackets = _Bracket(base, test, rays[ray], t[step], t[step + 1], inside[ray, step]).narrow(*_COARSE)
+        is_inside = test(c)
+        ray, step = np.nonzero(is_inside[:, 1:] != is_inside[:, :-1])
+        brackets = _Bracket(base, test, rays[ray], t[step], t[step + 1], is_inside[ray, step]).narrow(*_COARSE)
         names = [find_crossed_edges(c, heavy) for c in brackets.sides()[0]]
         distance = np.linalg.norm(base.clip_rays(brackets.rays, brackets.high), axis=1)
         for name in sorted({n for each in names for n in each}):
             rows = [k for k in np.argsort(distance, kind="stable") if name in names[k]]
-            found += brackets.select(_select_different(brackets.rays, rows)).narrow(*_FINE).crossings(heavy)
-    return sorted(found, key=lambda x: x.distance)
+            crossings += brackets.select(_select_different(brackets.rays, rows)).narrow(*_FINE).crossings(heavy)
+    return sorted(crossings, key=lambda x: x.distance)
 
 
 def list_directions(base: WeightedDesign) -> Array:
     """Unit vectors along ± each axis, along ± the gradient of each edge function, and in random directions."""
     axes = np.eye(len(base.lower))
     random = np.random.default_rng(0).standard_normal((_DIRECTIONS if len(axes) > 1 else 0, len(axes)))
-    near = base.coefficients(_STEP * np.concatenate([axes, -axes]))
-    slopes = (_edge_functions(near[: len(axes)]) - _edge_functions(near[len(axes) :])).T
+    coefficients = base.coefficients(_STEP * np.concatenate([axes, -axes]))
+    slopes = (_edge_functions(coefficients[: len(axes)]) - _edge_functions(coefficients[len(axes) :])).T
     slopes = slopes[np.all(np.isfinite(slopes), axis=1) & np.any(slopes != 0, axis=1)]
     largest = np.abs(slopes).max(axis=1, keepdims=True, initial=0.0)
     slopes = np.ldexp(slopes, -np.frexp(largest)[1])  # so that squares do not overflow
@@ -95,8 +93,8 @@ def find_most_damped(base: WeightedDesign, sign: float) -> list[Array]:
     rays = list_directions(base)
     u = base.clip_rays(rays[:, None, :], _RADII_AROUND).reshape(-1, rays.shape[1])
     c = sign * base.coefficients(u)
-    kept = np.any(u != 0, axis=1) & np.all(np.isfinite(c), axis=1) & (c[:, 0] > 0) & _stable(c)
-    u, c = u[kept], c[kept]
+    is_start = np.any(u != 0, axis=1) & np.all(np.isfinite(c), axis=1) & (c[:, 0] > 0) & _stable(c)
+    u, c = u[is_start], c[is_start]
     ratio = np.min(-(z := roots(c)).real / np.abs(z), axis=1) if len(c) else np.zeros(0)
     rows = np.argsort(-ratio, kind="stable").tolist()
     return [np.zeros(rays.shape[1]), *u[_select_different(u, rows)]]
@@ -125,11 +123,13 @@ def _edge_functions(c: Array) -> Array:
 def _select_different(rays: Array, rows: list[int]) -> NDArray[np.int_]:
     """The first few of these rows of `rays` that have clearly different directions."""
     unit = rays / np.linalg.norm(rays, axis=1, keepdims=True)
-    kept: list[int] = []
+    selected_rows: list[int] = []
     for k in rows:
-        if len(kept) < _MOST_CROSSINGS and all(float(unit[k] @ unit[selected]) < _SAME_DIRECTION for selected in kept):
-            kept.append(k)
-    return np.array(kept, dtype=int)
+        if len(selected_rows) < _MOST_CROSSINGS and all(
+            float(unit[k] @ unit[selected]) < _SAME_DIRECTION for selected in selected_rows
+        ):
+            selected_rows.append(k)
+    return np.array(selected_rows, dtype=int)
 
 
 @dataclass(frozen=True)
@@ -158,13 +158,13 @@ class _Bracket:
         rays = np.arange(len(low))
         for _ in range(rounds):
             t = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, parts + 1)
-            changed = self.test(self.coefficients(t[:, 1:-1])) != self.inside[:, None]
-            first = np.where(changed.any(axis=1), changed.argmax(axis=1) + 1, parts)
+            has_changed = self.test(self.coefficients(t[:, 1:-1])) != self.inside[:, None]
+            first = np.where(has_changed.any(axis=1), has_changed.argmax(axis=1) + 1, parts)
             low, high = t[rays, first - 1], t[rays, first]
         return replace(self, low=low, high=high)
 
     def sides(self) -> tuple[Array, Array]:
-        """Coefficients outside the edge times a sign, and that sign: the one of a0 on the inner side."""
+        """Coefficients outside the edge times the sign that a0 has on the inner side, and this sign."""
         inner, outer = (self.coefficients(np.where(self.inside == side, self.low, self.high)) for side in (True, False))
         sign = np.sign(inner[:, 0])
         return sign[:, None] * outer, sign

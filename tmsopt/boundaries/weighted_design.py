@@ -1,4 +1,4 @@
-"""A design, the weights of its changes, and the polynomials around it."""
+"""A design, the weights of its changes, and the polynomials of the designs around it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,13 +15,15 @@ from tmsopt.problem.quantities import STRUCTURE_TOLERANCE
 from tmsopt.records import Array, Numbers
 from tmsopt.roots import is_stable, multiple_real_roots, real_roots
 
-_NOTHING = 1e-12  # of a free parameter's range: a smaller value counts as 0
-_OPEN = 1e-6  # of the size of the parameter: smallest distance from an end that its range excludes
+_NOTHING = 1e-12  # a value smaller than this part of the range of a free parameter counts as 0
+_OPEN = 1e-6  # smallest distance from an end that a range excludes, relative to the size of the parameter
 
 
 @dataclass(frozen=True)
 class WeightedDesign:
-    """A design and the changes that are considered.
+    """A design and the changes of its parameters that are considered.
+
+    A displacement u gives the change of each parameter in units of its weight.
 
     Attributes:
         parameters: every parameter of the problem's set.
@@ -38,35 +40,35 @@ class WeightedDesign:
         return {**self.parameters, **displaced}
 
     def design(self, u: Array) -> dict[str, float]:
-        """The parameters at a displacement, inside their ranges and exactly at an end that is reached."""
-        at = self.displace(u)
+        """The parameters at a displacement, inside their ranges; a displacement to an end gives exactly the end."""
+        parameters = self.displace(u)
         for k, n in enumerate(self.weights):
             r = self.problem.parameter_set[n].range
-            at[n] = min(max(float(at[n]), r.lower), r.upper)
-            at[n] = r.lower if u[k] <= self.lower[k] and r.closed else at[n]
-            at[n] = r.upper if u[k] >= self.upper[k] and r.closed else at[n]
-        return at
+            parameters[n] = min(max(float(parameters[n]), r.lower), r.upper)
+            parameters[n] = r.lower if u[k] <= self.lower[k] and r.closed else parameters[n]
+            parameters[n] = r.upper if u[k] >= self.upper[k] and r.closed else parameters[n]
+        return parameters
 
     @cached_property
     def lower(self) -> Array:
-        """Displacements to the lower ends of the physical ranges."""
+        """Displacement of each parameter to the lower end of its physical range."""
         return self._ends[:, 0]
 
     @cached_property
     def upper(self) -> Array:
-        """Displacements to the upper ends."""
+        """Displacement of each parameter to the upper end of its physical range."""
         return self._ends[:, 1]
 
     @cached_property
     def _ends(self) -> Array:
-        """Displacements to the ends, slightly inside a range that excludes them."""
-        found = []
+        """Displacements to both ends of each range; if a range excludes its end, to a value slightly inside."""
+        displacements = []
         for n, weight in self.weights.items():
-            allowed, value = self.problem.parameter_set[n].range, self.parameters[n]
-            inset = 0.0 if allowed.closed else _OPEN * abs(value)
-            ends = (allowed.lower + inset - value) / weight, (allowed.upper - inset - value) / weight
-            found.append((min(ends[0], 0.0), max(ends[1], 0.0)))
-        return np.array(found)
+            physical_range, value = self.problem.parameter_set[n].range, self.parameters[n]
+            inset = 0.0 if physical_range.closed else _OPEN * abs(value)
+            ends = (physical_range.lower + inset - value) / weight, (physical_range.upper - inset - value) / weight
+            displacements.append((min(ends[0], 0.0), max(ends[1], 0.0)))
+        return np.array(displacements)
 
     def clip_rays(self, directions: Array, t: Array) -> Array:
         """Displacements t · direction, clipped to the ranges."""
@@ -84,7 +86,7 @@ class WeightedDesign:
     @cached_property
     def stable(self) -> bool:
         """Whether all roots are left of the imaginary axis."""
-        return bool(is_stable(self._scaled_weights))
+        return bool(is_stable(self._scaled_coefficients))
 
     @cached_property
     def edges(self) -> tuple[str, ...]:
@@ -94,38 +96,39 @@ class WeightedDesign:
     @cached_property
     def heavily_damped(self) -> bool:
         """Whether all roots are real and negative, multiple ones included."""
-        degree = len(self._scaled_weights) - 1
-        return self.is_on_damping_edge or bool(
-            self._scaled_weights[0] != 0 and real_roots(self._scaled_weights)[0] == degree
-        )
+        c = self._scaled_coefficients
+        return self.is_on_damping_edge or bool(c[0] != 0 and real_roots(c)[0] == len(c) - 1)
 
     @cached_property
     def is_on_damping_edge(self) -> bool:
         """Whether all roots are real and negative and two are equal, decided by coefficients."""
-        if self._scaled_weights[0] == 0 or not self.stable:
+        c = self._scaled_coefficients
+        if c[0] == 0 or not self.stable:
             return False
-        found = multiple_real_roots(self._scaled_weights, STRUCTURE_TOLERANCE)
-        return found is not None and all(r.re < 0 for r in found)
+        real = multiple_real_roots(c, STRUCTURE_TOLERANCE)
+        return real is not None and all(r.re < 0 for r in real)
 
     @cached_property
     def sizes(self) -> Array:
         """Size of the terms of each coefficient, by which equations between coefficients are judged."""
-        return measure_terms(self._scaled_weights) if self._scaled_weights.any() else np.ones(len(self._scaled_weights))
+        c = self._scaled_coefficients
+        return measure_terms(c) if c.any() else np.ones(len(c))
 
     @cached_property
-    def _scaled_weights(self) -> Array:
-        return self._raw / self.scale
+    def _scaled_coefficients(self) -> Array:
+        """Coefficients of the design itself, near 1."""
+        return self._coefficients / self.scale
 
     @cached_property
     def scale(self) -> Array:
         """Size of each coefficient in the design's unit of time."""
-        a = self._raw
+        a = self._coefficients
         unit = abs(a[-1] / a[0]) ** (1 / (len(a) - 1)) if a[0] and a[-1] else 1.0
         powers = unit ** np.arange(len(a))
         return np.asarray(powers * (float(np.abs(a / powers).max()) or 1.0))
 
     @cached_property
-    def _raw(self) -> Array:
+    def _coefficients(self) -> Array:
         return np.array(self.problem.model.coefficients(self.parameters, self.problem.parameter_set), dtype=float)
 
 
@@ -139,20 +142,20 @@ def weight_design(problem: Posed, parameters: Numbers, weights: Numbers | None) 
     faults += [] if weights is None else _weight_faults(problem, weights)
     if faults:
         raise InputError(faults)
-    own = {n: float(parameters[n]) for n in problem.parameter_set.names}
-    given = default_weights(problem, own) if weights is None else weights
-    return WeightedDesign(problem, own, {n: float(given[n]) for n in own if given.get(n, 0.0) > 0})
+    values = {n: float(parameters[n]) for n in problem.parameter_set.names}
+    weights = default_weights(problem, values) if weights is None else weights
+    return WeightedDesign(problem, values, {n: float(weights[n]) for n in values if weights.get(n, 0.0) > 0})
 
 
 def default_weights(problem: Posed, parameters: Numbers) -> dict[str, float]:
-    """|value| per parameter that may change; for a value 0 the largest |value| of the same unit, else 1."""
+    """The |value| of each parameter that may change; instead of 0 the largest |value| of the same unit, or else 1."""
     parameter_set = problem.parameter_set
     weights = {}
     widths = {n: high - low for n, (low, high) in problem.free.items()}
     sizes = {n: abs(x) if abs(x) > _NOTHING * widths.get(n, 0.0) else 0.0 for n, x in parameters.items()}
     for p in (p for p in parameter_set.parameters if p.may_change(sizes[p.name])):
-        alike = [sizes[q.name] for q in parameter_set.parameters if q.unit == p.unit and p.unit not in ("1", "rad")]
-        weights[p.name] = sizes[p.name] or max(alike, default=0.0) or 1.0
+        peers = [sizes[q.name] for q in parameter_set.parameters if q.unit == p.unit and p.unit not in ("1", "rad")]
+        weights[p.name] = sizes[p.name] or max(peers, default=0.0) or 1.0
     return weights
 
 

@@ -131,14 +131,14 @@ def add_sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lif
             require_at_least(other, one)
         build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
     require_at_least(1, zeta)  # real roots would satisfy any larger ratio too
-    guess = partial(_guess_sectors, frame, cases, ratio, build.unit)
+    guess = partial(_guess_sectors, frame, cases, ratio, build.scale.unit)
     return LiftedQuantity(constant(zeta), AddedVariable("damping_ratio", len(build.x) - first, guess), (), ())
 
 
 def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
     """Bound the factor coefficients of a pattern, the last variables so far: C(m, k) R^k for degree m."""
     count = len(pattern.unknowns)
-    largest = bound_roots(build.enclose(compact_coefficients(frame.model, build.values[0]))) / build.unit
+    largest = bound_roots(build.enclose(compact_coefficients(frame.model, build.values[0]))) / build.scale.unit
     symbols = build.x[-count:]
     for factor in pattern.factors(symbols):
         for k, c in enumerate(factor[1:], start=1):

@@ -1,7 +1,7 @@
-"""The nearest boundary points of a design as variables of the NLP, so that its stability radius is exact.
+"""Adds boundary points near a design to the NLP as variables, so that the stability radius of the design is exact.
 
-A boundary point at the displacement u satisfies the boundary equations e(u) = 0 and u + Jᵀλ = 0, J their Jacobian.
-Stability ends there or nearer, so |u| bounds the radius from above, whether or not the point is the nearest one.
+A boundary point at the displacement u satisfies the boundary equations e(u) = 0 and u + Jᵀλ = 0 with their Jacobian J.
+Stability ends at this point or nearer, so that |u| bounds the radius from above, even if the point is not the nearest.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -40,7 +40,7 @@ Displacements = Mapping[int, Mapping[str, Any]]
 
 
 def lift_displacements(weights: Mapping[str, float], points: Displacements) -> AddedVariable:
-    """The radius and all displacements as variables; they start at the cases as evaluated."""
+    """The radius and all displacements as variables; their starting values are those of the cases."""
 
     def guess(values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
         moves = (
@@ -52,9 +52,9 @@ def lift_displacements(weights: Mapping[str, float], points: Displacements) -> A
 
 
 def _measure_displacement(
-    weights: Mapping[str, float], names: Sequence[str], nominal: Values, at: Values
+    weights: Mapping[str, float], names: Sequence[str], nominal: Values, displaced: Values
 ) -> list[float]:
-    return [float(at[n] - nominal[n]) / weight_of(n, float(nominal[n]), weights) for n in names]
+    return [float(displaced[n] - nominal[n]) / weight_of(n, float(nominal[n]), weights) for n in names]
 
 
 def lift_boundary_points(
@@ -65,10 +65,10 @@ def lift_boundary_points(
     numeric_inputs: Callable[[Values], Mapping[str, float]],
     weights: Mapping[str, float],
 ) -> AddedVariable:
-    """Add the conditions of a boundary point in some cases, and radius² ≤ u·u.
+    """Add the conditions of a boundary point for each case in `points`, and radius² ≤ u·u.
 
     Args:
-        edges: case → the boundary its point lies on.
+        edges: case → the boundary on which its point lies.
         numeric_inputs: the numeric values, by name, on which the polynomial of a design depends.
     """
     lifted, first = [], build.size[0]
@@ -106,13 +106,13 @@ def _guess_unknowns(
     values: Sequence[Values],
     z: Sequence[Roots],
 ) -> list[list[float]]:
-    """√w of the pair nearest to the axis, and multipliers by least squares."""
+    """w of the pair nearest to the imaginary axis, and multipliers by least squares."""
     guesses: list[float] = []
     for point in points:
         w = [_axis_pair_size(z[point.case])] if point.has_frequency else []
         u = _measure_displacement(weights, point.names, values[0], values[point.case])
-        at = {**numeric_inputs(values[0]), **dict(zip(point.unknowns, [*u, *w], strict=True))}
-        slopes = np.array(fold(point.slopes, at, FLOATS), dtype=float).reshape(point.equations, -1)
+        inputs = {**numeric_inputs(values[0]), **dict(zip(point.unknowns, [*u, *w], strict=True))}
+        slopes = np.array(fold(point.slopes, inputs, FLOATS), dtype=float).reshape(point.equations, -1)
         multipliers = np.linalg.lstsq(slopes.T, -np.array([*u, *[0.0] * len(w)]), rcond=None)[0]
         guesses += [*w, *multipliers.tolist()]
     return [guesses]

@@ -1,4 +1,4 @@
-"""Scores many designs at once, by arrays: the objective and the violation of each limit in the worst case."""
+"""Scores many designs at once, with arrays: the objective and the violation of each limit in the worst case."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from tmsopt.problem.evaluate import coefficients_of, evaluate, roots_of
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array
 
-_FLAT = "damping_ratio"
+_RATIO = "damping_ratio"
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,11 @@ class DesignScores:
     """Worst-case values of designs, from numeric roots; near multiple roots they are approximate.
 
     Attributes:
-        worth: the objective, larger is worse, nan for a design without dynamics; None for a problem without objective.
-        beyond: excess over each limit, negative if it holds; for an equality, left minus right. Shape (limits, …).
-        equal: which limits are equalities.
+        worth: the objective, for which smaller is better; nan for a design with a singular mass matrix or coefficients
+            that are not finite; None for a problem without objective.
+        beyond: excess over each limit, negative if the limit holds; for an equality, the left side minus the right
+            side. Shape (limits, …).
+        equal: which limits are equalities, shape (limits,).
     """
 
     worth: Array | None
@@ -33,42 +35,42 @@ class DesignScores:
 
     @property
     def excess(self) -> Array:
-        """Violation of each limit; inf where the limit has no value."""
-        equal = self.equal.reshape(-1, *[1] * (self.beyond.ndim - 1))
-        amount = np.where(equal, np.abs(self.beyond), np.maximum(self.beyond, 0.0))
+        """Violation of each limit, ≥ 0; inf for a limit whose value is not a number."""
+        is_equality = self.equal.reshape(-1, *[1] * (self.beyond.ndim - 1))
+        amount = np.where(is_equality, np.abs(self.beyond), np.maximum(self.beyond, 0.0))
         return np.where(np.isnan(amount), np.inf, amount)
 
 
 def score_designs(problem: Posed, columns: Mapping[str, Array]) -> DesignScores:
-    """Score designs.
+    """Score designs by their worst cases.
 
     Args:
-        columns: free parameter → values, all of one shape.
+        columns: free parameter → values of the designs; all arrays have one shape.
     """
     shape = next(iter(columns.values())).shape
     nominal = problem.ordered(columns)
-    listed = [case.applied(nominal) for case in problem.cases if not case.direction]
-    varied = nominal
-    if listed:  # all cases at once, since small arrays cost as much as large ones
-        moved = {n for p in listed for n in p if p[n] is not nominal[n]}
-        varied = nominal | {n: _stack_cases([p[n] for p in listed], len(shape)) for n in moved}
-    every = (len(listed) or 1, *shape)
+    cases = [case.applied(nominal) for case in problem.cases if not case.direction]
+    parameters = nominal
+    if cases:  # all cases are computed together, since small arrays cost as much as large ones
+        varied_names = {n for p in cases for n in p if p[n] is not nominal[n]}
+        parameters = nominal | {n: _stack_cases([p[n] for p in cases], len(shape)) for n in varied_names}
+    shape_of_cases = (len(cases) or 1, *shape)
     conditions = list(problem.conditions.values())
     expressions = [e for e in (problem.objective, *conditions) if e]
-    a, names = coefficients_of(problem, varied), {n for e in expressions for n in e.names}
+    a, names = coefficients_of(problem, parameters), {n for e in expressions for n in e.names}
     # As in the recheck, all coefficients must be finite and the mass matrix nonsingular.
-    moves = np.broadcast_to(reduce(np.logical_and, map(np.isfinite, a), a[0] != 0), every)
+    has_dynamics = np.broadcast_to(reduce(np.logical_and, map(np.isfinite, a), a[0] != 0), shape_of_cases)
     worst = {}
-    for name, x in roots_of(a, {*names, "abscissa"} if _FLAT in names else names).items():
+    for name, x in roots_of(a, {*names, "abscissa"} if _RATIO in names else names).items():
         sign = WORSE_DIRECTION[name]
-        worst[name] = sign * np.broadcast_to(sign * x, every).max(axis=0)
-    found = dict(zip(expressions, evaluate(problem, expressions, varied | worst), strict=True))
-    equal = [c for c in conditions if c.equality]
-    if listed and equal:  # an equality holds for the nominal design
-        found |= zip(equal, evaluate(problem, equal, nominal | worst), strict=True)
+        worst[name] = sign * np.broadcast_to(sign * x, shape_of_cases).max(axis=0)
+    values = dict(zip(expressions, evaluate(problem, expressions, parameters | worst), strict=True))
+    equalities = [c for c in conditions if c.equality]
+    if cases and equalities:  # an equality is required of the nominal design only
+        values |= zip(equalities, evaluate(problem, equalities, nominal | worst), strict=True)
 
     def grade(e: Expression, sign: float) -> Array:
-        return np.asarray(np.where(moves, _grade(e, sign, found[e], worst), np.nan).max(axis=0))
+        return np.asarray(np.where(has_dynamics, _grade(e, sign, values[e], worst), np.nan).max(axis=0))
 
     return DesignScores(
         None if problem.objective is None else grade(problem.objective, problem.sign),
@@ -77,20 +79,20 @@ def score_designs(problem: Posed, columns: Mapping[str, Array]) -> DesignScores:
     )
 
 
-def _grade(expressions: Expression, sign: float, value: Array, worst: Mapping[str, Array]) -> Array:
-    """The signed value, less is better; the abscissa is added where a damping ratio alone is −1.
+def _grade(expression: Expression, sign: float, value: Array, worst: Mapping[str, Array]) -> Array:
+    """The value with its sign, so that smaller is better, plus the abscissa for a damping ratio of −1.
 
-    The ratio is −1 for every design with a positive real root, so only the abscissa then tells designs apart.
+    The ratio is −1 for every design with a positive real root, so that only the abscissa can compare such designs.
     """
-    found = sign * value
-    if expressions.names != (_FLAT,) or expressions.equality:
-        return found
-    at, above = (sign * float(expressions({_FLAT: ratio})) for ratio in (-1.0, -0.9))
-    if above >= at or (expressions.comparison and at <= 0):
-        return found
-    return np.where(worst[_FLAT] <= -1, found + worst["abscissa"], found)
+    grade = sign * value
+    if expression.names != (_RATIO,) or expression.equality:
+        return grade
+    lowest, next_lowest = (sign * float(expression({_RATIO: ratio})) for ratio in (-1.0, -0.9))
+    if next_lowest >= lowest or (expression.comparison and lowest <= 0):
+        return grade
+    return np.where(worst[_RATIO] <= -1, grade + worst["abscissa"], grade)
 
 
 def _stack_cases(each: Sequence[Any], axes: int) -> Array:
-    """A parameter in all cases, along a first axis."""
+    """The values of one parameter in all cases, stacked along a first axis."""
     return np.stack([x.reshape(x.shape or (1,) * axes) for x in np.broadcast_arrays(*each)])

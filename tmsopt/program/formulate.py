@@ -25,12 +25,12 @@ from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.limit import limit_value
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_QUANTITIES
-from tmsopt.program.angular_frequency import lift_angular_frequency
 from tmsopt.program.boundary_points import lift_boundary_points, lift_displacements
 from tmsopt.program.kinks import epigraph_form
 from tmsopt.program.lifts import (
     LiftedQuantity,
     lift_abscissa,
+    lift_angular_frequency,
     lift_damping_ratio,
     lift_positive_root,
     lift_quantity,
@@ -195,14 +195,6 @@ class Builder:
             numeric_inputs = partial(_numeric_inputs, problem)
             self.lifts.append(lift_boundary_points(self, radius, displacements, edges, numeric_inputs, problem.weights))
 
-    @property
-    def unit(self) -> float:
-        return self.scale.unit
-
-    @property
-    def leading_unit(self) -> float:
-        return self.scale.lead
-
     def polynomial(self, case: int) -> list[Any]:
         """Coefficients in one case, scaled so that the roots and the leading coefficient are near 1."""
         return self.scale.scale_coefficients(self.values[case].coefficients)
@@ -290,7 +282,7 @@ class Builder:
         unknowns = [self.variable(f"{pattern.name}.{u}") for u in pattern.unknowns]
         self.lifts.append(AddedVariable(pattern.name, len(unknowns), lambda v, z: pattern.guesses(z[0])))
         if pattern.abscissa is not None and self.covered_cases == [0]:
-            self.quantities["abscissa"] = self.unit * pattern.abscissa(unknowns)
+            self.quantities["abscissa"] = self.scale.unit * pattern.abscissa(unknowns)
         matched = [self.a[0] * c for c in pattern.monic(unknowns)]
         if degrees_of_freedom(self.problem).count >= 0:
             self.equal(pattern.name, self.a, matched)
@@ -323,7 +315,7 @@ class Builder:
             contacts=self.contacts,
             products=tuple(self.products),
             exact=bool(self.products) and formulation == "abscissa",
-            unit=self.unit,
+            unit=self.scale.unit,
             size=objective_size(self.problem),
             units=units_of(self.problem),
             objective_unit=objective_unit(self.problem),

@@ -33,12 +33,12 @@ _SETTINGS = {
 }
 
 _SIGNALS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP", "SIGALRM") if hasattr(signal, n)]
-_STEPS = 12
-_STALLED = 1e-14  # relative Newton step below which the iteration ends once steps no longer shrink
-_STATIONARY = 1e-9
+_STEPS = 12  # of Newton's method
+_STALLED = 1e-14  # the iteration ends when relative steps below this no longer become smaller
+_STATIONARY = 1e-9  # largest gradient of the Lagrangian that counts as 0
 _DEPENDENT = 1e-9  # limits are dependent if a singular value of their unit gradients is smaller
 _SINGULAR = 1e11  # a matrix is singular if a right side of size 1 has a larger solution
-_ROUNDINGS = 32 * float(np.finfo(float).eps)  # shifts of high degrees are sums of sums
+_ROUNDINGS = 32 * float(np.finfo(float).eps)  # of a row: shifted polynomials of high degree are sums of sums
 _ACTIVE = 1e-5  # slack below which a bound may be active even with a multiplier near 0
 
 
@@ -83,12 +83,12 @@ def make_ipopt(
     """A solver of one NLP: (start, optionally other limits) → run. Do not share it between threads.
 
     Args:
-        start: what to expect of the starts: ``far`` from a solution, ``exact`` (the equations hold), or ``near`` a
-            solution.
+        start: the kind of the starts: ``far`` from a solution, ``near`` a solution, or ``exact``: the equations of all
+            cases hold.
     """
     unit = (*nlp.units, *[1.0] * (len(nlp.variables) - len(nlp.units)))
-    chosen = (("ipopt.linear_solver", options.linear_solver), ("ipopt.max_iter", max_iterations))
-    solver = _SOLVERS.get(nlp.program, unit, 1 / nlp.objective_unit, (*chosen, *_SETTINGS[start].items()))
+    settings = (("ipopt.linear_solver", options.linear_solver), ("ipopt.max_iter", max_iterations))
+    solver = _SOLVERS.get(nlp.program, unit, 1 / nlp.objective_unit, (*settings, *_SETTINGS[start].items()))
 
     def run(x0: Array, limits: NLP = nlp) -> Run:
         lower, upper = np.array(limits.lower), np.array(limits.upper)
@@ -108,7 +108,7 @@ def make_ipopt(
 
 
 def _solver(
-    program: CompiledProgram, unit: tuple[float, ...], objective: float, chosen: tuple[tuple[str, Any], ...]
+    program: CompiledProgram, unit: tuple[float, ...], objective: float, user_settings: tuple[tuple[str, Any], ...]
 ) -> ca.Function:
     """IPOPT on a compiled program, with the variables in the given units."""
     settings: dict[str, Any] = {
@@ -121,7 +121,7 @@ def _solver(
         "ipopt.tol": 1e-12,
         "ipopt.bound_relax_factor": 0.0,
         "ipopt.obj_scaling_factor": objective,
-        **dict(chosen),
+        **dict(user_settings),
     }
     if set(unit) <= {1.0}:
         return ca.nlpsol("solver", "ipopt", program.function, {**settings, **program.derivatives})
@@ -149,7 +149,7 @@ def forget_solvers() -> None:
 
 
 def make_polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
-    """A function that refines runs of one NLP under given limits; it returns the better of both points."""
+    """A function (run, limits) → the refined point, or the point of the run itself if that is better."""
     expand = _CONDITIONS.get(nlp.program)
 
     def polish(run: Run, limits: NLP) -> Point:
@@ -161,7 +161,9 @@ def make_polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
 
 
 def relaxation_gain(nlp: NLP, point: Point) -> Callable[[Sequence[int]], float]:
-    """The first-order gain of relaxing several limits at once: the sum of their multipliers.
+    """A function for the first-order gain of the objective if several limits are relaxed at once.
+
+    The gain is the sum of the multipliers of these limits.
 
     If the active limits are dependent, several multipliers explain the gradient; the gain is then the least sum among
     them (Gauvin and Dubeau, 1982).
@@ -169,55 +171,57 @@ def relaxation_gain(nlp: NLP, point: Point) -> Callable[[Sequence[int]], float]:
     Returns:
         A function of indices of inequalities: rows first, then variables.
     """
-    own = np.concatenate([point.row_multipliers, point.bound_multipliers])
-    held = np.abs(own) > _STATIONARY * (1 + np.abs(own).max(initial=0.0))
+    multipliers = np.concatenate([point.row_multipliers, point.bound_multipliers])
+    is_active = np.abs(multipliers) > _STATIONARY * (1 + np.abs(multipliers).max(initial=0.0))
     _, slope, rows, jacobian = (
         part.full() for name in ("grad_f", "jac_g") for part in nlp.program.derivatives[name](point.x, nlp.constants)
     )
-    columns = np.hstack([jacobian.T, np.eye(len(point.x))])[:, held]
+    columns = np.hstack([jacobian.T, np.eye(len(point.x))])[:, is_active]
     lengths = np.linalg.norm(columns, axis=0)
-    known = np.all(np.isfinite(lengths) & (lengths > 0))
-    dependent = known and np.linalg.matrix_rank(columns / lengths, tol=_DEPENDENT) < len(lengths)
+    is_usable = np.all(np.isfinite(lengths) & (lengths > 0))
+    dependent = is_usable and np.linalg.matrix_rank(columns / lengths, tol=_DEPENDENT) < len(lengths)
     lower, upper = np.array([*nlp.row_lower, *nlp.lower]), np.array([*nlp.row_upper, *nlp.upper])
     value = np.concatenate([rows.ravel(), point.x])
     signs = np.where(value - lower <= upper - value, -1.0, 1.0)  # of multipliers at a lower and at an upper limit
-    free = (lower == upper)[held]
+    is_equation = (lower == upper)[is_active]
 
     def gain(limits: Sequence[int]) -> float:
         if dependent:
             from scipy.optimize import linprog  # importing it takes 0.25 s
 
-            chosen = np.isin(np.arange(len(own)), limits)[held] * signs[held]
-            least = np.where(free | (signs[held] < 0), -np.inf, 0.0).tolist()
-            most = np.where(free | (signs[held] > 0), np.inf, 0.0).tolist()
-            found = linprog(chosen, A_eq=columns, b_eq=-slope.ravel(), bounds=list(zip(least, most, strict=True)))
-            if found.success and found.fun is not None:
-                return float(found.fun)
-        return float(np.abs(own[limits]).sum())
+            cost = np.isin(np.arange(len(multipliers)), limits)[is_active] * signs[is_active]
+            lower_bounds = np.where(is_equation | (signs[is_active] < 0), -np.inf, 0.0).tolist()
+            upper_bounds = np.where(is_equation | (signs[is_active] > 0), np.inf, 0.0).tolist()
+            solution = linprog(
+                cost, A_eq=columns, b_eq=-slope.ravel(), bounds=list(zip(lower_bounds, upper_bounds, strict=True))
+            )
+            if solution.success and solution.fun is not None:
+                return float(solution.fun)
+        return float(np.abs(multipliers[limits]).sum())
 
     return gain
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Delay signal handlers until IPOPT has returned: CasADi would take their exceptions for failed evaluations.
+    """Delay signal handlers until IPOPT has returned, because CasADi takes their exceptions for failed evaluations.
 
-    It acts in the main thread alone, which receives the signals.
+    In other threads than the main one, which receives the signals, it does nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    received: list[int] = []
+    numbers: list[int] = []
     installed = ((number, signal.getsignal(number)) for number in _SIGNALS)
     handlers = {int(number): handler for number, handler in installed if callable(handler)}
     for number in handlers:
-        signal.signal(number, lambda number, frame: received.append(number))
+        signal.signal(number, lambda number, frame: numbers.append(number))
     try:
         yield
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
-    _call_handlers(received, handlers)
+    _call_handlers(numbers, handlers)
 
 
 def _call_handlers(received: list[int], handlers: Mapping[int, Any]) -> None:
@@ -242,8 +246,8 @@ class _Conditions:
 
     def evaluate(self, x: Array, rows: Array) -> tuple[float, Array, Array, Array, Array]:
         """Objective, gradient, rows, Jacobian, and Hessian of the Lagrangian."""
-        every = self.expand(x.tolist(), rows.tolist(), self.constants)
-        f, gradient, g, jacobian, hessian = [part.full() for part in every]
+        outputs = self.expand(x.tolist(), rows.tolist(), self.constants)
+        f, gradient, g, jacobian, hessian = [part.full() for part in outputs]
         return float(f.item()), gradient.ravel(), g.ravel(), jacobian, hessian
 
     def point(self, x: Array, rows: Array, bounds: Array) -> Point:
@@ -273,55 +277,57 @@ def _polish(conditions: _Conditions, run: Run) -> Point:
 
 
 def _find_releasable(conditions: _Conditions, point: Point) -> NDArray[np.bool_]:
-    """Rows held at a limit with a multiplier of the wrong sign, as when two limits nearly coincide."""
+    """Rows that are held at a limit with a multiplier of the wrong sign, for example if two limits nearly coincide."""
     small = _STATIONARY * (1 + np.abs(point.row_multipliers).max(initial=0.0))
-    below = np.isinf(conditions.row_upper) & (point.row_multipliers > small)
-    return np.asarray(below | (np.isinf(conditions.row_lower) & (point.row_multipliers < -small)))
+    is_below = np.isinf(conditions.row_upper) & (point.row_multipliers > small)
+    return np.asarray(is_below | (np.isinf(conditions.row_lower) & (point.row_multipliers < -small)))
 
 
 def _newton(conditions: _Conditions, run: Run, loose: bool, released: NDArray[np.bool_] | bool = False) -> Point | None:
-    """Newton's method with the active limits as equations; least squares if they are dependent.
+    """Newton's method with the active limits as equations, solved by least squares if the limits are dependent.
 
-    `released` rows are not held.
+    Args:
+        loose: whether a small slack alone makes a limit active; see `_active`.
+        released: rows that are not held, even if they are active.
     """
     lower, upper = conditions.lower, conditions.upper
     at_lower, at_upper = _active(run.x, lower, upper, run.bound_multipliers, loose)
     x = np.where(at_lower, lower, np.where(at_upper, upper, run.x))
-    free = np.logical_not(np.logical_or(at_lower, at_upper))
+    is_free = np.logical_not(np.logical_or(at_lower, at_upper))
     g = conditions.evaluate(x, run.row_multipliers)[2]
     if not np.all(np.isfinite(g)):
         return None
     low, high = _active(g, conditions.row_lower, conditions.row_upper, run.row_multipliers, loose)
-    held = np.logical_or(low, high) & ~np.asarray(released)
-    target = np.where(low, conditions.row_lower, conditions.row_upper)[held]
-    rows = np.where(held, run.row_multipliers, 0.0)
-    n, m, last = int(free.sum()), int(held.sum()), np.inf
+    active_rows = np.logical_or(low, high) & ~np.asarray(released)
+    target = np.where(low, conditions.row_lower, conditions.row_upper)[active_rows]
+    rows = np.where(active_rows, run.row_multipliers, 0.0)
+    n, m, last_size = int(is_free.sum()), int(active_rows.sum()), np.inf
     for _ in range(_STEPS):
         _, gradient, g, jacobian, hessian = conditions.evaluate(x, rows)
-        active = jacobian[np.ix_(held, free)]
-        matrix = np.block([[hessian[np.ix_(free, free)], active.T], [active, np.zeros((m, m))]])
-        right = np.concatenate([-gradient[free], target - g[held]])
+        active = jacobian[np.ix_(active_rows, is_free)]
+        matrix = np.block([[hessian[np.ix_(is_free, is_free)], active.T], [active, np.zeros((m, m))]])
+        right = np.concatenate([-gradient[is_free], target - g[active_rows]])
         if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(right))):
             return None
         scale = 1 / np.maximum(np.abs(matrix).max(axis=1, initial=0.0), 1e-300)
         solution = _solve_linear(matrix * scale[:, None], right * scale)
         x = x.copy()
-        x[free] += solution[:n]
+        x[is_free] += solution[:n]
         rows = np.zeros_like(rows)
-        rows[held] = solution[n:]
-        size = np.abs(solution[:n] / (1 + np.abs(x[free]))).max(initial=0.0)
-        if size <= _STALLED and size > last / 2:  # only rounding remains
+        rows[active_rows] = solution[n:]
+        size = np.abs(solution[:n] / (1 + np.abs(x[is_free]))).max(initial=0.0)
+        if size <= _STALLED and size > last_size / 2:  # only rounding remains
             break
-        last = size
+        last_size = size
     if not np.all(np.isfinite(x)):
         return None
     x = np.clip(x, lower, upper)
     _, gradient, _, jacobian, _ = conditions.evaluate(x, rows)
-    return conditions.point(x, rows, np.where(free, 0.0, -(gradient + jacobian.T @ rows)))
+    return conditions.point(x, rows, np.where(is_free, 0.0, -(gradient + jacobian.T @ rows)))
 
 
 def _solve_linear(matrix: Array, right: Array) -> Array:
-    """Solve a linear system; by minimal least squares (20 times slower) if it is singular.
+    """Solve a linear system. If it is singular, the shortest least-squares solution is found, 20 times slower.
 
     Two random right-hand sides reveal a singular matrix by the size of their solutions.
     """
@@ -336,7 +342,7 @@ def _solve_linear(matrix: Array, right: Array) -> Array:
 
 
 def _active(value: Array, lower: Array, upper: Array, multiplier: Array, loose: bool) -> tuple[Array, Array]:
-    """The lower and upper limits that hold with equality: there either the slack or the multiplier is tiny."""
+    """Which lower and upper limits are active: their slack is tiny if `loose`, else smaller than their multiplier."""
     threshold = _ACTIVE * (1 + np.abs(value))
     if loose:
         at_lower, at_upper = value - lower <= threshold, upper - value <= threshold
@@ -350,7 +356,7 @@ def _active(value: Array, lower: Array, upper: Array, multiplier: Array, loose: 
 
 
 def _better(refined: Point, raw: Point) -> bool:
-    """Whether a refined point is as feasible as the raw one and no worse, up to rounding and the violation."""
+    """Whether a refined point is near the raw one, as feasible and not worse, up to rounding."""
     scale = 1 + abs(raw.objective)
     return (
         refined.violation <= max(raw.violation, 1e-14 * scale, refined.rounding)

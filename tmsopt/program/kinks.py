@@ -1,11 +1,12 @@
 """Replaces abs, min and max in an NLP by variables, since a smooth solver cannot handle kinks.
 
-Each becomes a variable t with a row t ≥ piece for every piece: |e| is the greatest of e and −e, min(a, b) minus the
-greatest of −a and −b. This is exact where a larger t is never an advantage; elsewhere t is held equal to one piece at a
-time, with the others below it.
+Each of them is written with the greatest of some pieces: |e| is the greatest of e and −e; min(a, b) is minus the
+greatest of −a and −b. The greatest becomes a variable t with a row t ≥ piece for every piece. This is exact if a larger
+t is never an advantage. Otherwise a *contact* is needed: t is held equal to one piece at a time, and the other pieces
+are below it.
 
-A quotient or tangent with a pole in the box becomes t with the equation t · denominator = numerator, which is smooth on
-either side of the pole.
+A quotient or tangent with a pole in the box becomes a variable t with the equation t · denominator = numerator, which
+is smooth on both sides of the pole.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,22 +30,22 @@ KINK = ".kink"
 
 
 def epigraph_form(nlp: NLP, two_sided: bool) -> NLP:
-    """An NLP with its kinks as variables, and with the contacts it needs to be exact.
+    """The NLP with its kinks as variables, and with the contacts that make it exact.
 
     Args:
-        two_sided: whether root quantities need their contacts, kinks aside.
+        two_sided: whether root quantities need their contacts even without kinks.
     """
-    plain = nlp if two_sided else replace(nlp, contacts={})
+    smooth_nlp = nlp if two_sided else replace(nlp, contacts={})
     if not _may_have_kinks(nlp):
-        return plain
+        return smooth_nlp
     build = _EpigraphBuilder(nlp)
     f, g = build.expressions()
     if not build.kinks:
-        return plain
+        return smooth_nlp
     names = (*map(variable_name, range(len(nlp.variables) + len(build.kinks))), *nlp.numbers)
     count, first = len(build.kinks), len(nlp.rows)
     rows = sum(len(kink.rows) for kink in build.kinks)
-    plain = replace(
+    smooth_nlp = replace(
         nlp,
         variables=(*nlp.variables, *[KINK] * count),
         formula=formula([f, *g], names),
@@ -56,27 +57,27 @@ def epigraph_form(nlp: NLP, two_sided: bool) -> NLP:
         lifts=(*nlp.lifts, *[AddedVariable(KINK, 1, _guess_later)] * count),
         kinks=tuple(build.kinks),
     )
-    x = ca.SX.sym("x", len(plain.variables))
-    slopes = partial(_slopes, ca.jacobian(ca.vertcat(*plain.symbolic(x)), x))
-    held: dict[str, tuple[Contact, ...]] = {}
-    equal = set[int]()
-    for kink in reversed(build.kinks):  # a kink precedes those it is made of
+    x = ca.SX.sym("x", len(smooth_nlp.variables))
+    slopes = partial(_slopes, ca.jacobian(ca.vertcat(*smooth_nlp.symbolic(x)), x))
+    contact_sets: dict[str, tuple[Contact, ...]] = {}
+    equation_rows = set[int]()
+    for kink in reversed(build.kinks):  # first the kinks that contain others
         if kink.quotient:
-            equal.update(kink.rows)
-        elif not _never_improves(plain, slopes(kink.variable), 1.0, equal, kink.rows):
-            held[f"{KINK}{kink.variable}"] = tuple(Contact(row=k) for k in kink.rows)
-            equal.update(kink.rows)
-    rooted = range(first, first + rows)
+            equation_rows.update(kink.rows)
+        elif not _never_improves(smooth_nlp, slopes(kink.variable), 1.0, equation_rows, kink.rows):
+            contact_sets[f"{KINK}{kink.variable}"] = tuple(Contact(row=k) for k in kink.rows)
+            equation_rows.update(kink.rows)
+    kink_rows = range(first, first + rows)
     for name, contacts in nlp.contacts.items():
-        at = slopes(nlp.variables.index(name))
-        among = {k: slope for k, slope in at.items() if k in rooted}
-        if two_sided or not _never_improves(plain, among, WORSE_DIRECTION[name], equal):
-            held[name] = contacts
-    return replace(plain, contacts=held)
+        slope_of_row = slopes(nlp.variables.index(name))
+        kink_slopes = {k: slope for k, slope in slope_of_row.items() if k in kink_rows}
+        if two_sided or not _never_improves(smooth_nlp, kink_slopes, WORSE_DIRECTION[name], equation_rows):
+            contact_sets[name] = contacts
+    return replace(smooth_nlp, contacts=contact_sets)
 
 
 def _may_have_kinks(nlp: NLP) -> bool:
-    """Whether the box may contain a kink or a pole; one pass of interval arithmetic excludes most NLPs."""
+    """Whether the box may contain a kink or a pole; one pass of interval arithmetic excludes it for most NLPs."""
     if not {step.op for step in nlp.formula.steps} & {*_PIECES, *_POLES}:
         return False
     operations = INTERVALS.operations
@@ -108,45 +109,45 @@ class _EpigraphBuilder:
 
     def expressions(self) -> tuple[Any, list[Any]]:
         """Objective and rows without kinks."""
-        own = {op: partial(self.replace_kink, op) for op in _PIECES} | {
+        replacements = {op: partial(self.replace_kink, op) for op in _PIECES} | {
             op: partial(self.replace_pole, op) for op in _POLES
         }
-        kind = Kind({**NODES.operations, **own}, NODES.constant, NODES.number)
+        kind = Kind({**NODES.operations, **replacements}, NODES.constant, NODES.number)
         f, *g = fold(self.nlp.formula, {n: symbol(n) for n in self.nlp.formula.names}, kind)
         return f, [*g, *self.rows]
 
     def replace_kink(self, op: str, *operands: Any) -> Any:
-        """A kink that depends on variables, as a new variable."""
-        every = set(map(variable_name, range(self.count)))
-        if not any(depends_on(e, every) for e in operands):
+        """A new variable for a kink; the operation itself if it depends on no variable."""
+        variables = set(map(variable_name, range(self.count)))
+        if not any(depends_on(e, variables) for e in operands):
             return make_node(op, *operands)
         t = self.variable(pieces := _PIECES[op](*operands), quotient=False)
         self.rows += [t - piece for piece in pieces]
         return -t if op == "min" else t
 
     def variable(self, rows: Sequence[Any], quotient: bool) -> Any:
-        """A new variable for the rows that follow."""
+        """A new variable for the rows that the caller then adds."""
         first = len(self.nlp.rows) + len(self.rows)
         self.kinks.append(MaximumVariable(self.count, tuple(range(first, first + len(rows))), quotient=quotient))
         self.count += 1
         return symbol(variable_name(self.count - 1))
 
     def replace_pole(self, op: str, *operands: Any) -> Any:
-        """A quotient or tangent; a new variable if the denominator can vanish in the box."""
+        """A quotient or tangent, or a new variable for it if the denominator can vanish in the box."""
         numerator, denominator = _POLES[op](*operands)
-        own, plain = formula([denominator]), make_node(op, *operands)
-        if not own.dependent_steps(self.nlp.inputs) or own.dependent_steps(
+        denominator_formula, quotient_node = formula([denominator]), make_node(op, *operands)
+        if not denominator_formula.dependent_steps(self.nlp.inputs) or denominator_formula.dependent_steps(
             set(map(variable_name, range(len(self.nlp.inputs), self.count)))
         ):
-            return plain
+            return quotient_node
         box = [ball(ends) for ends in zip(self.nlp.lower, self.nlp.upper, strict=True)]
         try:
-            (over,) = replace(self.nlp, formula=own).fold(box, INTERVALS)
+            (denominator_range,) = replace(self.nlp, formula=denominator_formula).fold(box, INTERVALS)
         except UnsupportedOperation:
-            return plain
-        lower, upper = interval(over)
+            return quotient_node
+        lower, upper = interval(denominator_range)
         if lower > 0 or upper < 0:
-            return plain
+            return quotient_node
         t = self.variable([None], quotient=True)
         self.rows.append(t * denominator - numerator)
         return t
@@ -164,29 +165,40 @@ _PIECES: Mapping[str, Callable[..., Sequence[Any]]] = {
 
 
 def _slopes(jacobian: Any, variable: int) -> dict[int, Any]:
-    """Derivatives of the objective (−1) and of the rows by a variable, where they are not 0."""
+    """Index of a row, or −1 for the objective → its derivative with respect to a variable, if that is not 0."""
     column = jacobian[:, variable]
     return {k - 1: column[k] for k in range(column.size1()) if not column[k].is_zero()}
 
 
 def _never_improves(
-    nlp: NLP, slopes: Mapping[int, Any], worse: float, equal: set[int], but: Sequence[int] = ()
+    nlp: NLP,
+    slopes: Mapping[int, Any],
+    worse_direction: float,
+    equation_rows: set[int],
+    ignored_rows: Sequence[int] = (),
 ) -> bool:
-    """Whether raising a variable (lowering it for `worse` = −1) provably improves nothing, rows `but` aside.
+    """Whether raising a variable provably improves neither the objective nor a row.
 
-    This needs constant slopes of the right sign; a row that may be held `equal` can improve either way.
+    The slopes must be constant and have the right sign.
+
+    Args:
+        worse_direction: 1 if the variable is raised, −1 if it is lowered instead.
+        equation_rows: rows that may be held as equations; a change in any direction can then be an improvement.
+        ignored_rows: rows that are not considered.
     """
     for k, slope in slopes.items():
-        if k in but:
+        if k in ignored_rows:
             continue
-        below, above = (True, False) if k < 0 else (np.isinf(nlp.row_lower[k]), np.isinf(nlp.row_upper[k]))
-        if k in equal or below == above or not slope.is_constant():
+        has_no_lower, has_no_upper = (
+            (True, False) if k < 0 else (np.isinf(nlp.row_lower[k]), np.isinf(nlp.row_upper[k]))
+        )
+        if k in equation_rows or has_no_lower == has_no_upper or not slope.is_constant():
             return False
-        if worse * float(slope) * (1 if below else -1) < 0:
+        if worse_direction * float(slope) * (1 if has_no_lower else -1) < 0:
             return False
     return True
 
 
 def _guess_later(values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """A placeholder: the start of a kink follows from the variables before it."""
+    """A placeholder; `NLP.set_kinks` computes the start of a kink from the variables before it."""
     return [[0.0]]

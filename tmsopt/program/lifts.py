@@ -1,4 +1,4 @@
-"""Root quantities as variables with polynomial factors: statements about roots without computing a root."""
+"""Writes root quantities as variables of an NLP, defined by polynomial factors: no root is computed."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 
 from tmsopt.models import Values
 from tmsopt.models.expression import Expression
-from tmsopt.program.nlp import AddedVariable, Contact, Factor
+from tmsopt.program.nlp import AddedVariable, Contact, Factor, Scale
 from tmsopt.records import Array
 from tmsopt.roots import product, shift
 from tmsopt.roots.patterns.pattern import Roots
@@ -25,26 +25,22 @@ class ProgramBuilder(Protocol):
         """A new row."""
 
     def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
-        """Equate coefficient lists."""
+        """New rows that equate two lists of coefficients."""
 
     def polynomial(self, case: int) -> list[Any]:
-        """Coefficients in one case, in the NLP's unit of the roots."""
+        """Coefficients in one case, in the units of the NLP."""
 
     @property
     def covered_cases(self) -> Sequence[int]:
-        """Numbers of the cases over which root quantities are the worst."""
+        """Numbers of the cases over which a root quantity takes its worst value."""
 
     @property
-    def unit(self) -> float:
-        """The NLP's unit of the roots."""
+    def scale(self) -> Scale:
+        """The units of the NLP for the roots and for a0."""
 
     @property
     def lead(self) -> int:
-        """Sign of a0 in an NLP that reaches a0 = 0; else 0."""
-
-    @property
-    def leading_unit(self) -> float:
-        """The NLP's unit of a0."""
+        """Sign of a0 in an NLP whose feasible set includes a0 = 0; 0 otherwise."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -53,7 +49,14 @@ class ProgramBuilder(Protocol):
 
 @dataclass(frozen=True)
 class LiftedQuantity:
-    """A root quantity as a variable."""
+    """A root quantity as a variable.
+
+    Attributes:
+        symbol: the quantity, in the units of the problem.
+        lift: its variables and their starting values.
+        contacts: the ways in which a root can lie on the edge of the region that the variable bounds.
+        products: the factors of each case.
+    """
 
     symbol: Any
     lift: AddedVariable
@@ -61,51 +64,67 @@ class LiftedQuantity:
     products: tuple[tuple[Factor, ...], ...]
 
 
-def lift_factors(
+def _lift_by_factors(
     build: ProgramBuilder,
     name: str,
-    quadratic: Callable[[int, int, Any], tuple[list[Any], list[Contact]]],
-    squared: bool = False,
+    bounds: tuple[float, float],
+    quadratic: Callable[[Any, int, int, Any], tuple[list[Any], list[Contact]]],
+    place: Callable[[bool, Roots, float], float],
+    unit: float = 1.0,
     linear: tuple[str, float] = ("d", 0.0),
-    line: Any = None,
-) -> tuple[list[Contact], tuple[tuple[Factor, ...], ...]]:
-    """Write the polynomial of each covered case as a product of quadratic factors, and a linear one for an odd degree.
+    all_real: float | None = None,
+    is_shifted: bool = False,
+    squared: bool = False,
+) -> LiftedQuantity:
+    """A root quantity as a variable v, with the polynomial of each covered case as a product of quadratic factors.
+
+    If the degree is odd, the product has one linear factor too.
 
     Args:
-        quadratic: (number, case, lead) → coefficients and contacts of a factor; `lead` is ±a0 in the factor that takes
-            it so that the NLP reaches a0 = 0, else None.
-        squared: see `Factor`.
+        name: name of the quantity and of its rows.
+        bounds: lower and upper bound of v.
+        quadratic: (v, number, case, lead) → coefficients and contacts of a factor; `lead` is ±a0 in the factor that
+            takes it so that the NLP reaches a0 = 0, else None.
+        place: (near a solution, roots, their mean size) → starting value of v, for which the factors are feasible.
+        unit: unit of v.
         linear: name and lower bound of the constant term of the linear factor.
-        line: shift of the polynomial, to a line that the linear factor's root may be on.
-
-    Returns:
-        All contacts, and the factors of each case.
+        all_real: the value of v that is possible only if all roots are real.
+        is_shifted: whether the polynomials are shifted by v, so that a root of a linear factor may be on the edge.
+        squared: see `Factor`.
     """
-    lead, contacts, products = build.lead, list[Contact](), list[tuple[Factor, ...]]()
+    first = build.size[0]
+    edge = build.variable(name, *bounds)
+    contacts = [] if all_real is None else [Contact(lambda x: all_real, variable=first, value=all_real)]
+    lead, products = build.lead, list[tuple[Factor, ...]]()
     for case in build.covered_cases:
         a, factors, monic = build.polynomial(case), list[Factor](), list[list[Any]]()
         count, odd = divmod(len(a) - 1, 2)
         if lead:
             build.row("a0", lead * a[0], 0.0, np.inf)
         for k in range(1, count + 1):
-            at, own = build.size[0], lead * a[0] if lead and k == 1 and not odd else None
-            coefficients, own_contacts = quadratic(k, case, own)
+            first_unknown, factor_lead = build.size[0], lead * a[0] if lead and k == 1 and not odd else None
+            coefficients, factor_contacts = quadratic(edge, k, case, factor_lead)
             monic.append(coefficients)
-            if own is None:
-                factors.append(Factor(at, squared=squared))
-            if own is None or count == 1:  # the largest roots are not on the edge
-                contacts += own_contacts
+            if factor_lead is None:
+                factors.append(Factor(first_unknown, squared=squared))
+            if factor_lead is None or count == 1:  # the largest roots are not on the edge
+                contacts += factor_contacts
         if odd:
-            at, (letter, lower) = build.size[0], linear
+            first_unknown, (letter, lower) = build.size[0], linear
             monic.append([lead * a[0] if lead else 1, build.variable(f"{letter}.{case}", lower)])
             if not lead:
-                factors.append(Factor(at, linear=True))
-            if line is not None and (not lead or not count):
-                contacts.append(Contact(partial(_step_distance, at), variable=at))
-        left = a if line is None else shift(a, line)
-        build.equal(name, left, [(lead or a[0]) * c for c in product(*monic)])
+                factors.append(Factor(first_unknown, linear=True))
+            if is_shifted and (not lead or not count):
+                contacts.append(Contact(partial(_step_distance, first_unknown), variable=first_unknown))
+        build.equal(name, shift(a, edge) if is_shifted else a, [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
-    return contacts, tuple(products)
+    scale = abs(lead) / build.scale.lead
+    guesses = (
+        partial(_guess_factors, build.covered_cases, scale, is_shifted, squared, partial(place, is_near))
+        for is_near in (False, True)
+    )
+    lift = AddedVariable(name, build.size[0] - first, *guesses)
+    return LiftedQuantity(unit * edge, lift, tuple(contacts), tuple(products))
 
 
 def lift_abscissa(build: ProgramBuilder) -> LiftedQuantity:
@@ -115,21 +134,23 @@ def lift_abscissa(build: ProgramBuilder) -> LiftedQuantity:
     reaches a0 = 0, the first factor is ±a0 t² + βt + κ, so that a root may go to infinity; for an odd degree the linear
     factor is ±a0 t + δ instead.
     """
-    first = build.size[0]
-    gamma = build.variable("abscissa")
 
-    def quadratic(k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
-        at = build.size[0]
+    def quadratic(gamma: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
+        index = build.size[0]
         beta, kappa = build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)
         distances = (_pair_distance, _real_distance)
-        contacts = [Contact(partial(distance, at), variable=at + j) for j, distance in enumerate(distances)]
+        contacts = [Contact(partial(distance, index), variable=index + j) for j, distance in enumerate(distances)]
         return [1 if lead is None else lead, beta, kappa], contacts
 
-    contacts, products = lift_factors(build, "abscissa", quadratic, linear=("delta", 0.0), line=gamma)
-    scale = abs(build.lead) / build.leading_unit
-    guess, close = (partial(_abscissa_guess, build.covered_cases, near, scale) for near in (False, True))
-    lift = AddedVariable("abscissa", build.size[0] - first, guess, close)
-    return LiftedQuantity(build.unit * gamma, lift, tuple(contacts), products)
+    def place(is_near: bool, z: Roots, size: float) -> float:
+        """γ right of the rightmost root; near a solution by a tenth of the abscissa, which may be tiny, or less."""
+        right, step = float(z.real.max()), 0.05 * size
+        return right + (min(step, 0.1 * abs(right)) + 1e-6 if is_near else step + 1e-3)
+
+    bounds = (-np.inf, np.inf)
+    return _lift_by_factors(
+        build, "abscissa", bounds, quadratic, place, build.scale.unit, ("delta", 0.0), is_shifted=True
+    )
 
 
 def lift_damping_ratio(build: ProgramBuilder) -> LiftedQuantity:
@@ -139,23 +160,45 @@ def lift_damping_ratio(build: ProgramBuilder) -> LiftedQuantity:
     s + d, d ≥ 0. If the NLP reaches a0 = 0, the first factor is m² s² + p s + w² with m² = ±a0 and p ≥ 2 ζ m w; for an
     odd degree the linear factor is ±a0 s + d instead.
     """
-    first = build.size[0]
-    zeta = build.variable("damping_ratio", -1.0, 1.0)
 
-    def quadratic(k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
-        at = build.size[0]
+    def quadratic(zeta: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
+        index = build.size[0]
         p, w, m = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0), 1.0
         if lead is not None:
             m = build.variable(f"m.{case}", 0.0)
             build.row("damping_ratio", m * m - lead, 0.0, 0.0)
         build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
-        return [m * m, p, w * w], [Contact(partial(_sector_distance, at), row=build.size[1] - 1)]
+        return [m * m, p, w * w], [Contact(partial(_sector_distance, index), row=build.size[1] - 1)]
 
-    contacts, products = lift_factors(build, "damping_ratio", quadratic, squared=True)
-    guess = partial(_damping_guess, build.covered_cases, abs(build.lead) / build.leading_unit)
-    lift = AddedVariable("damping_ratio", build.size[0] - first, guess)
-    all_real = Contact(lambda x: 1.0, variable=first, value=1.0)
-    return LiftedQuantity(zeta, lift, (all_real, *contacts), products)
+    def place(is_near: bool, z: Roots, size: float) -> float:
+        """ζ slightly below the smallest damping ratio."""
+        return float(np.clip(np.min(-z.real / (np.abs(z) + 1e-300)) - 0.05, -0.95, 0.95))
+
+    return _lift_by_factors(build, "damping_ratio", (-1.0, 1.0), quadratic, place, all_real=1.0, squared=True)
+
+
+def lift_angular_frequency(build: ProgramBuilder) -> LiftedQuantity:
+    """Ω with p = a0 ∏ (s² + pᵢ s + qᵢ), pᵢ² + 4 Ω² ≥ 4 qᵢ, Ω ≥ 0, in every case: at or above every |Im s|.
+
+    All roots are in the strip |Im s| ≤ Ω. pᵢ² + 4 Ω² = 4 qᵢ puts a pair on its edge; real roots alone allow Ω = 0. An
+    odd degree adds one factor s + d. If the NLP reaches a0 = 0, the first factor is m s² + p s + q with m = ±a0 and
+    p² + 4 m² Ω² ≥ 4 m q; for an odd degree the linear factor is m s + d instead.
+    """
+
+    def quadratic(omega: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
+        index = build.size[0]
+        p, q, m = build.variable(f"p{k}.{case}"), build.variable(f"q{k}.{case}"), 1 if lead is None else lead
+        build.row("angular_frequency", p * p + 4 * m * m * omega * omega - 4 * m * q, 0.0, np.inf)
+        return [m, p, q], [Contact(partial(_strip_distance, index), row=build.size[1] - 1)]
+
+    def place(is_near: bool, z: Roots, size: float) -> float:
+        """Ω slightly above its value."""
+        return float(np.abs(z.imag).max()) + (1e-6 if is_near else 0.05 * size + 1e-3)
+
+    bounds, linear = (0.0, np.inf), ("d", -np.inf)
+    return _lift_by_factors(
+        build, "angular_frequency", bounds, quadratic, place, build.scale.unit, linear, all_real=0.0
+    )
 
 
 def lift_positive_root(build: ProgramBuilder) -> AddedVariable:
@@ -168,23 +211,26 @@ def lift_positive_root(build: ProgramBuilder) -> AddedVariable:
 
 
 def lift_real_roots(build: ProgramBuilder, line: bool) -> LiftedQuantity:
-    """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case; γ = 0 without a `line`.
+    """Heavy damping: γ ≤ 0 and roots γ − d₁, γ − d₁ − d₂, …, all dᵢ ≥ 0, in every case.
 
     This takes half as many equations as sectors and half-planes, and is regular at multiple roots, where the dᵢ between
     them are at their bound 0; p² ≥ 4q has dependent gradients there. d₁ = 0 puts a root on the line Re s = γ.
+
+    Args:
+        line: whether γ is a variable, the abscissa; otherwise γ = 0.
     """
     cases, first = build.covered_cases, build.size[0]
     gamma = build.variable("abscissa", upper=0.0) if line else 0.0
     contacts: list[Contact] = []
     for case in cases:
         a = build.polynomial(case)
-        at = build.size[0]
+        index = build.size[0]
         steps = [build.variable(f"d{k}.{case}", 0.0) for k in range(1, len(a))]
-        contacts.append(Contact(partial(_step_distance, at), variable=at))
+        contacts.append(Contact(partial(_step_distance, index), variable=index))
         distances = [sum(steps[:k], 0) for k in range(1, len(a))]
         build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, d] for d in distances))])
     lift = AddedVariable("abscissa", build.size[0] - first, partial(_real_guess, cases, line))
-    return LiftedQuantity(build.unit * gamma, lift, tuple(contacts), ())
+    return LiftedQuantity(build.scale.unit * gamma, lift, tuple(contacts), ())
 
 
 def lift_radius(build: ProgramBuilder, directions: Sequence[int]) -> AddedVariable:
@@ -205,7 +251,7 @@ def lift_radius(build: ProgramBuilder, directions: Sequence[int]) -> AddedVariab
 
 
 def lift_quantity(build: ProgramBuilder, name: str, case: int, ends: tuple[float, float]) -> tuple[Any, AddedVariable]:
-    """A derived quantity as a variable, to be fixed by its division-free equation."""
+    """A variable for a derived quantity; the caller adds the equation without division that defines it."""
     symbol = build.variable(name if case == 0 else f"{name}.{case}", *ends)
     return symbol, AddedVariable(name, 1, lambda values, z: [[_finite(values[case][name])]])
 
@@ -214,34 +260,40 @@ def worst_guess(
     sign: float, expression: Expression, cases: Sequence[int], values: Sequence[Values], z: Sequence[Any]
 ) -> list[list[float]]:
     """The worst finite value over the cases."""
-    found = [sign * float(expression(values[k])) for k in cases]
-    return [[max((v for v in found if np.isfinite(v)), default=0.0)]]
+    case_values = [sign * float(expression(values[k])) for k in cases]
+    return [[max((v for v in case_values if np.isfinite(v)), default=0.0)]]
 
 
-_DOUBLE = 1e-3  # real roots closer than this, relative to the largest root, may be one double root
+_DOUBLE = 1e-3  # two real roots with a smaller distance, relative to the largest root, may be one double root
 
 
-def _pair_distance(at: int, x: Array) -> float:
+def _pair_distance(index: int, x: Array) -> float:
     """Distance from the line to a complex pair of t² + βt + κ, or to the middle of a real pair."""
-    return float(x[at] / 2)
+    return float(x[index] / 2)
 
 
-def _real_distance(at: int, x: Array) -> float:
-    """Distance from the line to the nearer of two real roots; for a complex pair, plus its imaginary part."""
-    half, kappa = x[at] / 2, x[at + 1]
-    rest = float(np.sqrt(abs(half * half - kappa)))
-    return float(half + rest if half * half < kappa else kappa / (half + rest or 1.0))
+def _real_distance(index: int, x: Array) -> float:
+    """Distance from the line to the nearer real root; for a complex pair, its distance plus its imaginary part."""
+    half, kappa = x[index] / 2, x[index + 1]
+    offset = float(np.sqrt(abs(half * half - kappa)))
+    return float(half + offset if half * half < kappa else kappa / (half + offset or 1.0))
 
 
-def _step_distance(at: int, x: Array) -> float:
+def _step_distance(index: int, x: Array) -> float:
     """Distance from the line to the rightmost root."""
-    return float(x[at])
+    return float(x[index])
 
 
-def _sector_distance(at: int, x: Array) -> float:
-    """Damping ratio of a pair; the pair with the smallest one is on the edge."""
-    p, w = x[at], x[at + 1]
+def _sector_distance(index: int, x: Array) -> float:
+    """Damping ratio of a pair; the pair with the smallest ratio is on the edge."""
+    p, w = x[index], x[index + 1]
     return float(p / (2 * w)) if w > 0 else np.inf
+
+
+def _strip_distance(index: int, x: Array) -> float:
+    """Minus the imaginary part of a pair, the largest of which is on the edge; positive for two real roots."""
+    square = x[index] ** 2 / 4 - x[index + 1]
+    return float(np.copysign(np.sqrt(abs(square)), square))
 
 
 def _finite(value: Any) -> float:
@@ -249,30 +301,30 @@ def _finite(value: Any) -> float:
 
 
 def pair_roots(z: Roots) -> list[Roots]:
-    """Roots two by two: conjugates together, nearly equal real ones together, then real neighbours.
+    """Roots in pairs: conjugate roots, nearly equal real roots, then neighbouring real roots.
 
-    For an odd number, one real root comes last and alone: the leftmost that is not nearly equal to another.
+    If the number of roots is odd, a single real root comes last: the leftmost that is not nearly equal to another.
     """
     pairs, real = [z[k : k + 2] for k in range(0, len(z) - 1, 2) if z[k].imag], np.sort(z[z.imag == 0].real)
-    alone = real[:0]
+    single_root = real[:0]
     while len(real) > 1:
         gaps = np.diff(real)
         k = int(np.argmin(gaps))
         if gaps[k] > _DOUBLE * np.abs(z).max():
             if len(real) % 2:
-                alone, real = real[:1], real[1:]
+                single_root, real = real[:1], real[1:]
                 continue
             k = 0
         pairs.append(real[k : k + 2].astype(complex))
         real = np.delete(real, [k, k + 1])
-    lone = real if len(real) else alone
+    lone = real if len(real) else single_root
     return [*pairs, *([lone.astype(complex)] if len(lone) else [])]
 
 
 def factors_of(z: Roots, gamma: float, lead: float = 1.0) -> list[float]:
-    """β and κ of the factors about the line Re s = γ; δ of a linear one.
+    """β and κ of each quadratic factor in t = s − γ, then δ of the linear factor, if there is one.
 
-    A `lead` other than 1 scales the linear factor, or else the first one, which then has the largest roots.
+    A `lead` other than 1 scales the linear factor, or without one the first factor, which then has the largest roots.
     """
     pairs = [pair - gamma for pair in pair_roots(z)]
     if lead != 1.0:
@@ -283,47 +335,47 @@ def factors_of(z: Roots, gamma: float, lead: float = 1.0) -> list[float]:
     return [float(c) for factor in each for c in factor]
 
 
-def _abscissa_guess(
-    cases: Sequence[int], near: bool, lead_scale: float, values: Sequence[Values], z: Sequence[Roots]
+def _guess_factors(
+    cases: Sequence[int],
+    lead_scale: float,
+    is_shifted: bool,
+    squared: bool,
+    place: Callable[[Roots, float], float],
+    values: Sequence[Values],
+    z: Sequence[Roots],
 ) -> list[list[float]]:
-    """γ slightly right of the rightmost root, and the factors of the shifted polynomials: exactly feasible.
+    """The variable of `_lift_by_factors` where `place` puts it, and factors that match the coefficients exactly.
 
-    `near` a solution the step is at most a tenth of the abscissa, which may be far smaller than the roots.
+    Args:
+        lead_scale: |a0| in the NLP relative to a0; 0 if the factors are monic.
     """
-    every = np.concatenate([z[case] for case in cases])
-    right, step = float(every.real.max()), 0.05 * float(np.abs(every).mean())
-    gamma = right + (min(step, 0.1 * abs(right)) + 1e-6 if near else step + 1e-3)
-    leads = [lead_scale * abs(float(values[case].coefficients[0])) if lead_scale else 1.0 for case in cases]
-    return [[gamma, *(c for case, a0 in zip(cases, leads, strict=True) for c in factors_of(z[case], gamma, a0))]]
+    roots = np.concatenate([z[case] for case in cases])
+    edge = place(roots, float(np.abs(roots).mean()))
+    guess = [edge]
+    for case in cases:
+        a0 = lead_scale * abs(float(values[case].coefficients[0])) if lead_scale else 1.0
+        factors = factors_of(z[case], edge if is_shifted else 0.0, a0)
+        if squared:
+            factors = [float(np.sqrt(abs(c))) if k % 2 else c for k, c in enumerate(factors)]
+            if lead_scale and len(z[case]) % 2 == 0:
+                factors.insert(2, float(np.sqrt(a0)))
+        guess += factors
+    return [guess]
 
 
 def _real_guess(cases: Sequence[int], line: bool, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """Real roots at the real parts of the design's roots, but left of 0."""
-    every = np.concatenate([z[case] for case in cases])
-    gamma = min(float(every.real.max()) + 0.05 * float(np.abs(every).mean()) + 1e-3, -1e-3) if line else 0.0
+    """Real roots at the real parts of the roots of the design, but left of 0."""
+    roots = np.concatenate([z[case] for case in cases])
+    gamma = min(float(roots.real.max()) + 0.05 * float(np.abs(roots).mean()) + 1e-3, -1e-3) if line else 0.0
     steps = [np.diff(np.sort(np.maximum(gamma - z[case].real, 1e-3)), prepend=0.0) for case in cases]
     return [[*([gamma] if line else []), *(float(d) for part in steps for d in part)]]
 
 
-def _damping_guess(
-    cases: Sequence[int], lead_scale: float, values: Sequence[Values], z: Sequence[Roots]
-) -> list[list[float]]:
-    """ζ slightly below its value, p and w of every factor, and m if `lead_scale` is not 0."""
-    every = np.concatenate([z[case] for case in cases])
-    found = [min(max(float(np.min(-every.real / (np.abs(every) + 1e-300))) - 0.05, -0.95), 0.95)]
-    for case in cases:
-        a0 = lead_scale * abs(float(values[case].coefficients[0])) if lead_scale else 1.0
-        factors = factors_of(z[case], 0.0, a0)
-        roots = [np.sqrt(abs(c)) if k % 2 else c for k, c in enumerate(factors)]
-        found += [*roots[:2], *([np.sqrt(a0)] if lead_scale and len(z[case]) % 2 == 0 else []), *roots[2:]]
-    return [[float(x) for x in found]]
-
-
 def _positive_guess(case: int, values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """The rightmost real root, or the root nearest to one, and the polynomial of the others."""
+    """The rightmost real root, or the root that is nearest to one, and the polynomial of the other roots."""
     first = int(np.argmax(z[case].real - 2 * np.abs(z[case].imag)))
-    rest = np.atleast_1d(np.poly(np.delete(z[case], first))).real
-    return [[max(float(z[case][first].real), 0.0), *map(float, rest[1:])]]
+    quotient = np.atleast_1d(np.poly(np.delete(z[case], first))).real
+    return [[max(float(z[case][first].real), 0.0), *map(float, quotient[1:])]]
 
 
 def _radius_guess(directions: Sequence[int], values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:

@@ -1,4 +1,4 @@
-"""An NLP as plain data, its units, and the values it starts from."""
+"""A nonlinear program (NLP) as plain data, its units, and the starting values of its variables."""
 
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -22,24 +22,25 @@ from tmsopt.records import Array
 from tmsopt.roots import roots
 from tmsopt.roots.patterns.pattern import Roots
 
-_SHARED = 1e-3  # relative distance below which roots of two factors count as shared
+_SHARED = 1e-3  # roots of two factors with a smaller relative distance count as shared
 
 _TIE = 1e-3
-"""Distances that differ by less count as equal."""
+"""Distances of contacts that differ by less than this count as equal."""
 
 _LARGE = 50_000
 """Operations times variables above which functions are differentiated instead of expressions."""
 
-_KEPT = 64
-"""Compiled programs kept; while cases are added one by one, most are used once."""
+_MAX_PROGRAMS = 64
+"""Compiled programs in the cache; most are used once, while cases are added one by one."""
 
 _FIRST_DERIVATIVES = {"f": "grad:f:x", "g": "jac:g:x"}  # derivatives, as CasADi writes them
 _SCALE_DESIGNS = 33  # designs from which scales are estimated
-_ORDINARY = (1e-2, 1e3)  # sizes that need no scaling
+_ORDINARY = (1e-2, 1e3)  # sizes in this range need no scaling
 
 Guess = Callable[[Sequence[Values], Sequence[Roots]], list[list[float]]]
-"""Starting values of added variables, from the quantities and roots of the nominal design and each case; one list per
-choice."""
+"""Starting values of added variables, from the quantities and roots of the nominal design and of each case.
+
+Each list is one choice."""
 
 
 @dataclass(frozen=True)
@@ -58,12 +59,12 @@ class AddedVariable:
 
 @dataclass(frozen=True)
 class Contact:
-    """One way in which a root can lie on the edge of a root quantity's region, or a kink on one of its pieces.
+    """One way in which a root can lie on the edge of the region of a root quantity, or a kink variable equals a piece.
 
     Attributes:
-        distance: distance of the root from the edge at a point of the NLP; by default the value of the row. The nearest
-            of several contacts is tried first.
-        variable, row: what is held at `value`.
+        distance: distance of the root from the edge at a point of the NLP; by default the value of the row. Of several
+            contacts, the nearest one is tried first.
+        variable, row: index of the variable or of the row that is held at `value`.
     """
 
     distance: Callable[[Array], float] | None = None
@@ -104,8 +105,8 @@ class Factor:
         if self.linear:
             return (-float(x[self.first]),)
         half, q = -x[self.first] / 2, x[self.first + 1]
-        rest = half * half - (q * q if self.squared else q)
-        return (float(half - np.sqrt(rest)), float(half + np.sqrt(rest))) if rest >= 0 else ()
+        square = half * half - (q * q if self.squared else q)
+        return (float(half - np.sqrt(square)), float(half + np.sqrt(square))) if square >= 0 else ()
 
 
 @dataclass(frozen=True)
@@ -189,9 +190,9 @@ class NLP:
         return values
 
     def impose_contacts(self, x: Array, tie: float = _TIE) -> Iterator["NLP"]:
-        """The NLP with one contact held for each entry of `contacts`: first the nearest to a point, then others.
+        """The NLP with one contact held for each entry of `contacts`: first those nearest to a point.
 
-        Each of the others exchanges one contact for another that is as near, up to `tie`.
+        Each NLP after the first exchanges one contact for another one that is as near, up to `tie`.
         """
         rows = self.evaluate(x)[1] if self.kinks else x
         ranked: list[list[Contact]] = []
@@ -201,10 +202,10 @@ class NLP:
             ]
             order = np.argsort(distances, kind="stable")
             ranked.append([contacts[k] for k in order if distances[k] <= distances[order[0]] + tie or k == order[0]])
-        nearest = [close[0] for close in ranked]
+        nearest = [nearest_contacts[0] for nearest_contacts in ranked]
         yield self._hold_contacts(nearest)
-        for k, close in enumerate(ranked):
-            for contact in close[1:]:
+        for k, nearest_contacts in enumerate(ranked):
+            for contact in nearest_contacts[1:]:
                 yield self._hold_contacts([*nearest[:k], contact, *nearest[k + 1 :]])
 
     def _hold_contacts(self, contacts: Sequence[Contact]) -> "NLP":
@@ -230,18 +231,18 @@ class NLP:
         return x
 
     def has_split_double_root(self, x: Array) -> bool:
-        """Whether two factors share a root that is double in neither.
+        """Whether two factors share a real root that is a double root of neither factor.
 
-        Such a double root cannot become a pair, so the point may be stationary for the NLP but not for the design. With
-        both roots in one factor it can.
+        The two equal roots cannot become a complex pair, so that the point may be stationary for the NLP but not for
+        the design. If both roots are in one factor, they can.
         """
         for factors in self.products:
-            real = [found for factor in factors if (found := factor.real_roots(x))]
-            for one, other in combinations(real, 2):
-                near = _SHARED * (1 + max(map(abs, (*one, *other))))
-                shared = min(abs(r - t) for r in one for t in other) <= near
-                double = any(len(pair) == 2 and pair[1] - pair[0] <= near for pair in (one, other))
-                if shared and not double:
+            real = [real_roots for factor in factors if (real_roots := factor.real_roots(x))]
+            for first, second in combinations(real, 2):
+                tolerance = _SHARED * (1 + max(map(abs, (*first, *second))))
+                is_shared = min(abs(r - t) for r in first for t in second) <= tolerance
+                is_double = any(len(pair) == 2 and pair[1] - pair[0] <= tolerance for pair in (first, second))
+                if is_shared and not is_double:
                     return True
         return False
 
@@ -274,7 +275,7 @@ class CompiledProgram:
     def derivatives(self) -> dict[str, ca.Function]:
         """Derivatives that CasADi would otherwise form anew for every solver."""
         make = self.function.factory
-        first = {of: make("d" + of, ["x", "p"], [of, d]) for of, d in _FIRST_DERIVATIVES.items()}
+        first = {output: make("d" + output, ["x", "p"], [output, d]) for output, d in _FIRST_DERIVATIVES.items()}
         second = make("dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
         return {"grad_f": first["f"], "jac_g": first["g"], "hess_lag": second}
 
@@ -282,13 +283,13 @@ class CompiledProgram:
 def compile_program(formula: Formula, count: int) -> CompiledProgram:
     """Compile the formula of an NLP with `count` variables to CasADi functions."""
     variables = tuple(map(variable_name, range(count)))
-    names, number_formula, rest = formula.split(formula.dependent_steps(variables))
+    names, number_formula, variable_formula = formula.split(formula.dependent_steps(variables))
     x, p = ca.SX.sym("x", count), ca.SX.sym("p", len(names))
-    given = dict(zip((*variables, *names), [*ca.vertsplit(x), *ca.vertsplit(p)], strict=True))
-    f, *g = fold(rest, given, CASADI)
+    inputs_by_name = dict(zip((*variables, *names), [*ca.vertsplit(x), *ca.vertsplit(p)], strict=True))
+    f, *g = fold(variable_formula, inputs_by_name, CASADI)
     outputs = [ca.densify(ca.SX(f)), ca.densify(ca.vertcat(ca.SX(0, 1), *g))]
     function = ca.Function("nlp", [x, p], outputs, ["x", "p"], ["f", "g"])
-    if len(rest.steps) * count >= _LARGE:
+    if len(variable_formula.steps) * count >= _LARGE:
         inputs: list[Any] = [ca.MX.sym("x", count), ca.MX.sym("p", len(names))]
         function = ca.Function("nlp", inputs, list(function(*inputs)), ["x", "p"], ["f", "g"])
     return CompiledProgram(number_formula, function)
@@ -302,11 +303,11 @@ def _compute_constants(formula: Formula, count: int, numbers: tuple[tuple[str, f
 class PerThread(threading.local):
     """Caches the last results of a function for each thread: CasADi objects must not be used from two threads."""
 
-    def __init__(self, make: Callable[..., Any], most: int) -> None:
-        self.get = lru_cache(maxsize=most)(make)
+    def __init__(self, make: Callable[..., Any], max_results: int) -> None:
+        self.get = lru_cache(maxsize=max_results)(make)
 
 
-_PROGRAMS, _CONSTANTS = PerThread(compile_program, _KEPT), PerThread(_compute_constants, _KEPT)
+_PROGRAMS, _CONSTANTS = PerThread(compile_program, _MAX_PROGRAMS), PerThread(_compute_constants, _MAX_PROGRAMS)
 
 
 def forget_programs() -> None:
@@ -329,18 +330,15 @@ class Scale:
 
     def scale_coefficients(self, coefficients: Sequence[Any]) -> list[Any]:
         """Descending coefficients of the polynomial in s/unit, over the unit of the leading one."""
-        if self == Scale():
-            return list(coefficients)
-        n = len(coefficients) - 1
-        return [c / (self.lead * self.unit**k) for k, c in zip(range(n + 1), coefficients, strict=True)]
+        return [c / (self.lead * self.unit**k) for k, c in enumerate(coefficients)]
 
 
 def scale_of(problem: Posed) -> Scale:
-    """Median sizes of roots and leading coefficients over the box, which make tolerances mean the same everywhere."""
+    """Median sizes of roots and leading coefficients over the box, so that tolerances are relative to them."""
     if problem.model.natural:
         return Scale()
-    found = coefficients_of(problem, problem.ordered(_spread_designs(problem)))
-    a = np.stack(np.broadcast_arrays(*found), axis=-1)
+    columns = coefficients_of(problem, problem.ordered(_spread_designs(problem)))
+    a = np.stack(np.broadcast_arrays(*columns), axis=-1)
     a = a.reshape(-1, a.shape[-1])
     a = a[np.all(np.isfinite(a), axis=1) & np.any(a != 0, axis=1)]
     if not len(a):
@@ -352,7 +350,7 @@ def scale_of(problem: Posed) -> Scale:
 
 
 def objective_size(problem: Posed) -> float:
-    """The size of the objective: at most 1; the unit of the roots if the objective is the abscissa."""
+    """The size of the objective, at most 1: the unit of the roots if the objective is the abscissa, else 1."""
     about = problem.objective.names if problem.objective else ()
     return min(1.0, scale_of(problem).unit) if about == ("abscissa",) else 1.0
 
@@ -366,7 +364,7 @@ def _spread_designs(problem: Posed) -> dict[str, Any]:
 
 
 def objective_unit(problem: Posed) -> float:
-    """A power of 2 near the size of a small objective; IPOPT scales large ones itself, small ones not."""
+    """A power of 2 near the size of a small objective, else 1; IPOPT itself scales only large objectives."""
     if problem.model.natural or problem.objective is None or not problem.free:
         return 1.0
     [values] = evaluate(problem, [problem.objective], problem.ordered(_spread_designs(problem)))
@@ -376,7 +374,7 @@ def objective_unit(problem: Posed) -> float:
 
 
 def units_of(problem: Posed) -> tuple[float, ...]:
-    """For each free parameter a power of 2 near the size of its range, or 1 if that is close enough."""
+    """For each free parameter a power of 2 near the size of its range, or 1 if the size is ordinary."""
     if problem.model.natural:
         return ()
     sizes = [max(map(abs, ends)) for ends in problem.free.values()]
@@ -384,15 +382,15 @@ def units_of(problem: Posed) -> tuple[float, ...]:
 
 
 def proof_units(problem: Posed) -> dict[str, float]:
-    """For each free parameter a power of 2 near its size, or near its range if it is large: the unit of a proof."""
+    """The unit of each free parameter in a proof: a power of 2 near its size, or near its range for a large size."""
     units = dict(zip(problem.free, units_of(problem), strict=False))  # empty for natural units
     return {n: u if u <= 1 else unit_near(problem.free[n][1] - problem.free[n][0]) for n, u in units.items()}
 
 
 def unit_near(size: float) -> float:
-    """A power of 2 near a size; 1 if that is close enough, or the size is 0 or not finite."""
-    near = _ORDINARY[0] <= size <= _ORDINARY[1] or size == 0 or not np.isfinite(size)
-    return 1.0 if near else _power_of_two(np.array([size]))
+    """A power of 2 near a size; 1 if the size is ordinary, 0 or not finite."""
+    is_ordinary = _ORDINARY[0] <= size <= _ORDINARY[1] or size == 0 or not np.isfinite(size)
+    return 1.0 if is_ordinary else _power_of_two(np.array([size]))
 
 
 def _power_of_two(sizes: Any) -> float:

@@ -1,4 +1,4 @@
-"""How to solve: the options, declared once and passed from a command or verb to IPOPT."""
+"""The options of a solution, declared once and passed from a command or a function to IPOPT."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -9,7 +9,7 @@ from tmsopt.errors import MOST_STARTS, Fault, InputError, call_faults, count_fau
 from tmsopt.progress import Listener, Steps, steps_for
 
 LINEAR_SOLVERS = ("mumps", "spral")
-"""Linear solvers of the IPOPT in the CasADi wheel; it ignores any other name without an error."""
+"""Linear solvers of the IPOPT in the CasADi wheel, which ignores any other name without an error."""
 
 STARTS = 64
 """Default maximum of starts; most problems need a dozen."""
@@ -81,13 +81,13 @@ def documents_options(accepted: type, defaults: Options = DEFAULTS) -> Callable[
     """A decorator that adds the accepted options and their defaults to a function's signature."""
 
     def add_signature(verb: Verb) -> Verb:
-        own = inspect.signature(verb)
-        named = [p for p in own.parameters.values() if p.kind is not p.VAR_KEYWORD]
+        signature = inspect.signature(verb)
+        parameters = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
         options = [
             inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=getattr(defaults, name), annotation=kind)
             for name, kind in accepted.__annotations__.items()
         ]
-        vars(verb)["__signature__"] = own.replace(parameters=[*named, *options])
+        vars(verb)["__signature__"] = signature.replace(parameters=[*parameters, *options])
         return verb
 
     return add_signature
@@ -96,7 +96,7 @@ def documents_options(accepted: type, defaults: Options = DEFAULTS) -> Callable[
 def make_options(
     chosen: CommonOptions | SolveOptions, accepted: type = CommonOptions, defaults: Options = DEFAULTS, fewest: int = 1
 ) -> Options:
-    """The options that a user named, with defaults for the others.
+    """The options that a user chose, with defaults for all others.
 
     Args:
         fewest: smallest meaningful number of starts.
@@ -105,18 +105,18 @@ def make_options(
         TypeError: for an unknown name.
         InputError: for a value out of range.
     """
-    given: dict[str, Any] = {**vars(defaults), **chosen}
+    values: dict[str, Any] = {**vars(defaults), **chosen}
     for name in chosen:
         if name not in accepted.__annotations__:
             raise TypeError(f"unknown option '{name}'; {suggest(name, accepted.__annotations__)}")
-    faults = [*count_faults("starts", given["starts"], fewest, MOST_STARTS), *count_faults("seed", given["seed"], 0)]
-    if not isinstance(given["near"], Mapping | None):
-        faults.append(Fault(f"found {short(given['near'])}; accepted: a mapping of parameters to values", ("near",)))
-    if not (is_number(given["stability"]) and given["stability"] >= 0):
-        faults.append(Fault(f"found {short(given['stability'])}; accepted: seconds, 0 or more", ("stability",)))
-    if given["linear_solver"] not in LINEAR_SOLVERS:
-        message = f"found {short(given['linear_solver'])}; accepted: {' '.join(LINEAR_SOLVERS)}"
+    faults = [*count_faults("starts", values["starts"], fewest, MOST_STARTS), *count_faults("seed", values["seed"], 0)]
+    if not isinstance(values["near"], Mapping | None):
+        faults.append(Fault(f"found {short(values['near'])}; accepted: a mapping of parameters to values", ("near",)))
+    if not (is_number(values["stability"]) and values["stability"] >= 0):
+        faults.append(Fault(f"found {short(values['stability'])}; accepted: seconds, 0 or more", ("stability",)))
+    if values["linear_solver"] not in LINEAR_SOLVERS:
+        message = f"found {short(values['linear_solver'])}; accepted: {' '.join(LINEAR_SOLVERS)}"
         faults.append(Fault(message, ("linear_solver",)))
-    if faults := [*faults, *call_faults("progress", given["progress"])]:
+    if faults := [*faults, *call_faults("progress", values["progress"])]:
         raise InputError(faults)
-    return Options(**given | {"progress": steps_for(given["progress"])})
+    return Options(**values | {"progress": steps_for(values["progress"])})

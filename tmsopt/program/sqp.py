@@ -15,7 +15,7 @@ _QUIET_QP = ("print_header", "print_iter", "print_info", "error_on_fail")
 
 
 def make_sqp(nlp: NLP, max_iterations: int = 100) -> Callable[[Array], Run]:
-    """A solver of one NLP: start → run; it approximates the Hessian from gradients. Do not share it between threads."""
+    """A solver of one NLP: start → run. It approximates the Hessian from gradients. Do not share it between threads."""
     solver = _SOLVERS.get(nlp.program, max_iterations)
     lower, upper = np.array(nlp.lower), np.array(nlp.upper)
     limits = {"lbx": nlp.lower, "ubx": nlp.upper, "lbg": nlp.row_lower, "ubg": nlp.row_upper, "p": nlp.constants}

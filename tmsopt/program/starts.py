@@ -1,4 +1,4 @@
-"""Designs to start from, spread over the box, and matching starting values of the added variables."""
+"""Chooses designs to start from, spread over the box, and starting values of the variables that an NLP adds."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice, product
@@ -23,28 +23,28 @@ _CANDIDATES = 16
 
 _RADII = tuple(float(r) for r in np.geomspace(0.5, 1e-3, 28))
 
-_CORNERS = 10  # free parameters up to which all corners of the box are candidates
+_MAX_CORNER_PARAMETERS = 10  # with at most this many free parameters, all corners of the box are candidates
 
 _BATCH = 16  # starts whose candidates are scored together
 
 
 def choose_starts(problem: Posed, seed: int, count: int) -> Iterator[dict[str, float]]:
-    """`count` designs to start from: the best of each few candidates of a quasi-random sequence over the box.
+    """`count` designs to start from: each is the best of a few candidates of a quasi-random sequence over the box.
 
-    Every other one is chosen by the constraints alone, so that the starts do not all fall into one good region. Every
-    third comes from candidates moved to the faces of the box, where many optima have basins of their own. The first is
-    the best corner.
+    Every other start is chosen by the constraints alone, so that the starts do not all lie in one good region. Every
+    third start comes from candidates that are moved to the faces of the box, because only such starts lead to many
+    optima. The first start is the best corner.
     """
-    if count > 1 and len(problem.free) <= _CORNERS:
+    if count > 1 and len(problem.free) <= _MAX_CORNER_PARAMETERS:
         corners = np.array(list(product(*problem.free.values())))
         objective, violation = _measure_merit(problem, dict(zip(problem.free, corners.T, strict=True)))
         best = corners[int(np.argmin(objective + violation))]
         yield dict(zip(problem.free, best.tolist(), strict=True))
         count -= 1
-    pool_of = sample_box(problem, seed)
-    for done in range(0, count, _BATCH):
-        size = min(_BATCH, count - done)
-        pool = list(islice(pool_of, _CANDIDATES * size))
+    designs = sample_box(problem, seed)
+    for first in range(0, count, _BATCH):
+        size = min(_BATCH, count - first)
+        pool = list(islice(designs, _CANDIDATES * size))
         pool = [_move_to_faces(problem, d) if k // _CANDIDATES % 3 == 2 else d for k, d in enumerate(pool)]
         columns = {n: np.array([d[n] for d in pool]) for n in problem.free}
         objective, violation = (m.reshape(size, _CANDIDATES) for m in _measure_merit(problem, columns))
@@ -53,38 +53,38 @@ def choose_starts(problem: Posed, seed: int, count: int) -> Iterator[dict[str, f
 
 
 def _find_stable_radius(nlp: NLP, problem: Posed, nominal: Mapping[str, float]) -> float:
-    """A radius at which the design is stable in all directions of an NLP; small if there is none."""
-    directed = [case for case in nlp.cases if case.direction and not case.edge]
+    """A radius at which the design is stable in all directions of the cases; the smallest one if there is none."""
+    direction_cases = [case for case in nlp.cases if case.direction and not case.edge]
     upper_bounds = (float(np.linalg.norm(list(case.direction.values()))) for case in nlp.cases if case.edge)
-    most = min(upper_bounds, default=np.inf)
-    if not directed and np.isfinite(most):
-        return most
-    for radius in (r for r in _RADII if directed and r <= most):
-        at = [case.applied(nominal, radius, problem.weights) for case in directed]
-        if np.all(is_stable([[float(c) for c in problem.values(p).coefficients] for p in at])):
+    max_radius = min(upper_bounds, default=np.inf)
+    if not direction_cases and np.isfinite(max_radius):
+        return max_radius
+    for radius in (r for r in _RADII if direction_cases and r <= max_radius):
+        designs = [case.applied(nominal, radius, problem.weights) for case in direction_cases]
+        if np.all(is_stable([[float(c) for c in problem.values(p).coefficients] for p in designs])):
             return radius
     return _RADII[-1]
 
 
 def _move_to_faces(problem: Posed, design: Mapping[str, float]) -> dict[str, float]:
     """The design with each parameter in an outer third of its range moved to the end of that range."""
-    moved = {}
+    values = {}
     for name, (lower, upper) in problem.free.items():
         share = (design[name] - lower) / (upper - lower)
-        moved[name] = lower if share < 1 / 3 else upper if share > 2 / 3 else design[name]
-    return moved
+        values[name] = lower if share < 1 / 3 else upper if share > 2 / 3 else design[name]
+    return values
 
 
 def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], near: bool = False) -> Array:
-    """Start of all variables of an NLP: the design, and added variables that satisfy their equations there.
+    """The starting point of an NLP: the design, and values of the added variables that satisfy their equations.
 
     Args:
         near: whether the design is close to a solution.
     """
     nominal = problem.ordered(design)
     radius = _find_stable_radius(nlp, problem, nominal)
-    varied = (case.applied(nominal, radius, problem.weights) for case in nlp.cases)
-    values = [problem.values(nominal).with_known({RADIUS: radius}), *map(problem.values, varied)]
+    case_parameters = (case.applied(nominal, radius, problem.weights) for case in nlp.cases)
+    values = [problem.values(nominal).with_known({RADIUS: radius}), *map(problem.values, case_parameters)]
     z = _compute_roots(nlp, values)
     x = variables_of(problem, design)
     for lift in nlp.lifts:
@@ -123,31 +123,31 @@ def sample_box(problem: Posed, seed: int) -> Iterator[dict[str, float]]:
 
 
 def _measure_merit(problem: Posed, columns: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Objective and constraint violation of many designs in their worst cases, each in units of its spread."""
-    found = score_designs(problem, columns)
+    """Objective and constraint violation of many designs in their worst cases, each relative to its spread."""
+    scores = score_designs(problem, columns)
     shape = next(iter(columns.values())).shape
     objective, violation = np.zeros(shape), np.zeros(shape)
-    if found.worth is not None:
-        objective += _divide_by_spread(found.worth)
+    if scores.worth is not None:
+        objective += _divide_by_spread(scores.worth)
     if problem.pattern is not None:
         each = coefficients_of(problem, problem.ordered(columns))
         a = regularise(np.stack([np.broadcast_to(c, shape) for c in each], axis=-1))
         mismatch = [guess_distance(problem.pattern, c, z) for c, z in zip(a, roots(a), strict=True)]
         violation += 3 * _divide_by_spread(np.array(mismatch))
-    for excess in found.excess:
+    for excess in scores.excess:
         violation += 3 * _divide_by_spread(excess)
     return objective, violation
 
 
 def _divide_by_spread(column: Array) -> Array:
-    """A column in units of its interquartile range, huge where it is not finite."""
-    known = column[np.isfinite(column)]
-    spread = float(np.subtract(*np.percentile(known, [75, 25]))) if known.size else 0.0
+    """A column in units of its interquartile range; a value that is not finite becomes huge."""
+    finite = column[np.isfinite(column)]
+    spread = float(np.subtract(*np.percentile(finite, [75, 25]))) if finite.size else 0.0
     return np.where(np.isfinite(column), column, 1e6) / (spread or 1.0)
 
 
 def _measure_mismatch(nlp: NLP, x: list[float], guess: list[float]) -> float:
-    """Size of the rows with the later added variables still at 0."""
+    """Size of the rows while the variables that are added later are still 0."""
     trial = np.zeros(len(nlp.variables))
     trial[: len(x) + len(guess)] = x + guess
     g = nlp.evaluate(trial)[1]

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array
 
-_STEEP = 7.0  # the inner half of the scale near 0 covers 3 % of a range, its inner tenth 2e-3
-_DECADES = 100.0  # ratio of the ends of a range above which its scale is logarithmic
+_STEEP = 7.0  # c of the scale near 0: its inner half covers 3 % of a range, its inner tenth 2e-3 of it
+_DECADES = 100.0  # if the ratio of the ends of a range is larger, its scale is logarithmic
 
 
 @dataclass(frozen=True)
 class UnitBox:
-    """The box of a problem as a unit cube; angles scale by their tangent, ranges over decades by their logarithm."""
+    """The box of a problem as a unit cube: angles scale by their tangent, ranges over decades by their logarithm."""
 
     problem: Posed
 
@@ -29,18 +29,18 @@ class UnitBox:
         """Columns of parameters for points of shape (…, size)."""
         lower, upper, first, width = self._ends.reshape(4, -1, *[1] * (u.ndim - 1))
         place = np.moveaxis(u, -1, 0)
-        plain = [back(row) for (_, back), row in zip(self._scales, first + width * place, strict=True)]
-        x = np.minimum(np.maximum(np.stack(plain), lower), upper)
-        x = np.where(place <= 0, lower, np.where(place >= 1, upper, x))  # to the last digit
+        values = [back(row) for (_, back), row in zip(self._scales, first + width * place, strict=True)]
+        x = np.minimum(np.maximum(np.stack(values), lower), upper)
+        x = np.where(place <= 0, lower, np.where(place >= 1, upper, x))  # exactly, without rounding
         return dict(zip(self.problem.free, x, strict=True))
 
     def points(self, designs: Mapping[str, float]) -> Array:
         """The point of one design."""
-        found = []
+        coordinates = []
         for (name, ends), (stretch, _) in zip(self.problem.free.items(), self._scales, strict=True):
             lower, upper, x = stretch(np.array([*ends, designs[name]]))
-            found.append((x - lower) / (upper - lower))
-        return np.asarray(np.clip(found, 0.0, 1.0))
+            coordinates.append((x - lower) / (upper - lower))
+        return np.asarray(np.clip(coordinates, 0.0, 1.0))
 
     def even_near_zero(self, u: Array) -> tuple[Array, Array]:
         """Move points to a scale that resolves values near 0, and return the slopes of that map.
@@ -48,25 +48,25 @@ class UnitBox:
         The scale is halfway between the cube's own and x = b sinh(c y)/sinh(c).
         """
         rows, size, ends = self._zeros
-        changed, slopes = u.copy(), np.ones_like(u)
+        points, slopes = u.copy(), np.ones_like(u)
         x = (self._ends[2] + self._ends[3] * u)[..., rows]
-        changed[..., rows] = (u[..., rows] + (np.arcsinh(x / size) - ends[0]) / (ends[1] - ends[0])) / 2
+        points[..., rows] = (u[..., rows] + (np.arcsinh(x / size) - ends[0]) / (ends[1] - ends[0])) / 2
         slopes[..., rows] = (1 + self._ends[3][rows] / np.hypot(x, size) / (ends[1] - ends[0])) / 2
-        return np.clip(changed, 0.0, 1.0), slopes
+        return np.clip(points, 0.0, 1.0), slopes
 
     def sample_near_zero(self, u: Array) -> Array:
         """Spread points along x = b sinh(c y)/sinh(c) in each range that contains 0."""
         rows, size, ends = self._zeros
-        changed = u.copy()
+        points = u.copy()
         x = size * np.sinh(ends[0] + (ends[1] - ends[0]) * u[..., rows])
-        changed[..., rows] = np.clip((x - self._ends[2][rows]) / self._ends[3][rows], 0.0, 1.0)
-        return changed
+        points[..., rows] = np.clip((x - self._ends[2][rows]) / self._ends[3][rows], 0.0, 1.0)
+        return points
 
     @cached_property
     def _zeros(self) -> tuple[NDArray[np.int_], Array, Array]:
         """Parameters whose range contains 0; the unit of their scale, and its ends, shape (2, number)."""
-        plain = np.array([stretch is np.positive for stretch, _ in self._scales], dtype=bool)
-        rows = np.flatnonzero(plain & (self._ends[0] <= 0) & (self._ends[1] >= 0))
+        is_unscaled = np.array([stretch is np.positive for stretch, _ in self._scales], dtype=bool)
+        rows = np.flatnonzero(is_unscaled & (self._ends[0] <= 0) & (self._ends[1] >= 0))
         ends = self._ends[:2][:, rows]
         size = np.abs(ends).max(axis=0, initial=0.0) / np.sinh(_STEEP)
         return rows, size, np.arcsinh(ends / size)
@@ -74,9 +74,9 @@ class UnitBox:
     @cached_property
     def _ends(self) -> Array:
         """Lower and upper ends; the scaled lower ends and widths. Shape (4, size)."""
-        plain = np.array([*self.problem.free.values()]).reshape(-1, 2)
-        ends = np.array([stretch(e) for (stretch, _), e in zip(self._scales, plain, strict=True)]).reshape(-1, 2)
-        return np.stack([*plain.T, ends[:, 0], ends[:, 1] - ends[:, 0]])
+        ranges = np.array([*self.problem.free.values()]).reshape(-1, 2)
+        ends = np.array([stretch(e) for (stretch, _), e in zip(self._scales, ranges, strict=True)]).reshape(-1, 2)
+        return np.stack([*ranges.T, ends[:, 0], ends[:, 1] - ends[:, 0]])
 
     @cached_property
     def _scales(self) -> list[tuple[np.ufunc, np.ufunc]]:

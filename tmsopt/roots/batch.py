@@ -1,4 +1,4 @@
-"""Classes and motion of many polynomials of one degree: quartics by closed formulas, others by numeric roots."""
+"""Finds classes and motion of many polynomials of one degree: quartics by closed formulas, others by numeric roots."""
 
 from collections.abc import Sequence
 
@@ -48,7 +48,7 @@ def find_motion(coefficients: Sequence[ArrayLike]) -> Motion:
     alpha, ratio = np.full((2, len(rows)), np.nan)
     regular = np.flatnonzero(np.all(np.isfinite(rows), axis=1) & (rows[:, 0] != 0))
     for block in make_blocks(regular.size):
-        chosen = regular[block]
-        z = roots(rows[chosen])
-        alpha[chosen], ratio[chosen] = z.real.max(axis=1), np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
+        columns = regular[block]
+        z = roots(rows[columns])
+        alpha[columns], ratio[columns] = z.real.max(axis=1), np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
     return Motion(alpha.reshape(shape), ratio.reshape(shape), regular.size)

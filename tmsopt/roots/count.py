@@ -40,8 +40,8 @@ def real_roots(coefficients: ArrayLike, exact: bool = True) -> tuple[Counts, Cou
     real = z.imag == 0
     negative, positive = np.sum(real & (z.real < 0), axis=1), np.sum(real & (z.real > 0), axis=1)
     for k in np.flatnonzero(doubtful) if exact else ():
-        found = [r.re for r in exact_roots(rows[k].tolist()) if r.im == 0]
-        negative[k], positive[k] = sum(r < 0 for r in found), sum(r > 0 for r in found)
+        real_parts = [r.re for r in exact_roots(rows[k].tolist()) if r.im == 0]
+        negative[k], positive[k] = sum(r < 0 for r in real_parts), sum(r > 0 for r in real_parts)
     return negative.reshape(c.shape[:-1]), positive.reshape(c.shape[:-1])
 
 

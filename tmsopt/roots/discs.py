@@ -15,9 +15,9 @@ from tmsopt.roots.numeric import roots
 from tmsopt.roots.quartics.quartic import quartic_factors
 
 _HORNER = 4 * np.finfo(float).eps  # times degree and size of the terms: rounding error of a complex Horner scheme
-_IGNORED_ROUNDINGS = 18.0  # rounding errors that count as none when a structure is decided
-_FLOOR = 1e-3  # of the median root: smaller roots count as this size when a structure is decided
-_LARGEST = 1e40  # coefficient relative to the leading one, beyond which a root may exceed doubles
+_IGNORED_ROUNDINGS = 18.0  # so many rounding errors count as none when a structure is decided
+_FLOOR = 1e-3  # smallest size of a root when a structure is decided, relative to the median root
+_LARGEST = 1e40  # if a coefficient is larger, relative to the leading one, a root may exceed doubles
 
 
 @dataclass(frozen=True)
@@ -25,12 +25,12 @@ class Motions:
     """Motion of each polynomial.
 
     Attributes:
-        abscissa, damping_ratio: of the roots.
+        abscissa, damping_ratio: abscissa and smallest damping ratio of the roots.
         frequency: greatest |Im s|.
         oscillates: whether a pair is rightmost.
         scatter: largest error of a numeric root.
-        simple: whether all this is certain, and every polynomial within the tolerance has only simple roots and exactly
-            one rightmost root or pair.
+        simple: whether these values are certain, and every polynomial within the tolerance has only simple roots and
+            exactly one rightmost root or pair.
     """
 
     abscissa: Bounded
@@ -46,9 +46,9 @@ class Discs:
 
     Attributes:
         distances: |zᵢ − zⱼ| of each pair of roots.
-        product: |a0| ∏ |z − zⱼ|, over the other roots zⱼ.
+        product: |a0| ∏ |z − zⱼ| over the other roots zⱼ, for each root z.
         change: largest change of p(z) within the errors of the coefficients.
-        radius: of the discs.
+        radius: radius of each disc.
     """
 
     def __init__(self, coefficients: Array, errors: Array, z: Complex) -> None:
@@ -79,18 +79,18 @@ def enclose_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motion
     """
     a, errors = (np.stack([getattr(c, field) for c in coefficients]) for field in ("value", "error"))
     n = len(a) - 1
-    usable = np.isfinite(a).all(axis=0) & np.isfinite(errors).all(axis=0)
-    usable &= (np.abs(a[0]) > 2 * errors[0]) & (np.abs(a[0]) * _LARGEST > np.abs(a).max(axis=0))
-    solved = np.where(usable, a, (np.arange(n + 1) % n == 0)[:, None] * 1.0)
-    z = np.ascontiguousarray((quartic_factors(*solved).roots if n == 4 else roots(solved.T)).T)
+    is_usable = np.isfinite(a).all(axis=0) & np.isfinite(errors).all(axis=0)
+    is_usable &= (np.abs(a[0]) > 2 * errors[0]) & (np.abs(a[0]) * _LARGEST > np.abs(a).max(axis=0))
+    polynomials = np.where(is_usable, a, (np.arange(n + 1) % n == 0)[:, None] * 1.0)
+    z = np.ascontiguousarray((quartic_factors(*polynomials).roots if n == 4 else roots(polynomials.T)).T)
     size = np.abs(z)
-    floored = np.maximum(size, _FLOOR * np.median(size, axis=0))
-    terms = np.stack([np.prod(size[i] + floored, axis=0) for i in range(n)])
+    min_size = np.maximum(size, _FLOOR * np.median(size, axis=0))
+    terms = np.stack([np.prod(size[i] + min_size, axis=0) for i in range(n)])
     discs = Discs(a / a[0], errors / np.abs(a[0]), z)
     radius = discs.radius
     reach = n * (1.1 * tolerance * terms + _IGNORED_ROUNDINGS * discs.change) / discs.product + radius
     top, rows = z.real.argmax(axis=0), np.arange(z.shape[1])
-    simple = usable & (reach < size).all(axis=0) & discs.are_disjoint(reach)
+    simple = is_usable & (reach < size).all(axis=0) & discs.are_disjoint(reach)
     right, right_reach = z[top, rows], reach[top, rows]
     for i in range(n):
         is_near = (right.real - z[i].real <= reach[i] + right_reach) & (z[i].real != right.real)
@@ -101,14 +101,15 @@ def enclose_motions(coefficients: Sequence[Bounded], tolerance: float) -> Motion
 
 
 def _damping_ratio(z: Complex, radius: Array, size: Array) -> tuple[Bounded, Truth]:
-    """The least −Re s/|s|, exactly ±1 if a real root has it; and whether it is certain which root has it."""
+    """The smallest −Re s/|s|, exactly ±1 if a real root has it, and whether it is certain which root has it."""
     real, size = z.imag == 0, np.where(size > 0, size, 1.0)
     ratio, errors = np.where(real, np.inf, -z.real / size), 2 * radius / size
     place, rows = ratio.argmin(axis=0), np.arange(z.shape[1])
-    least, error = ratio[place, rows], errors[place, rows]
-    growing, certain = (real & (z.real > 0)).any(axis=0), np.ones(z.shape[1], dtype=bool)
+    min_ratio, error = ratio[place, rows], errors[place, rows]
+    has_growth, is_certain = (real & (z.real > 0)).any(axis=0), np.ones(z.shape[1], dtype=bool)
     for k in range(len(z)):
-        same = real[k] | (z[k] == z[place, rows]) | (z[k] == z[place, rows].conj())
-        certain &= same | (ratio[k] - errors[k] > least + error)
-    damped = np.where(growing, -1.0, np.where(real.all(axis=0), 1.0, 0.0))
-    return Bounded(least, error).where(damped == 0, Bounded(damped, np.zeros_like(damped))), certain | (damped != 0)
+        is_same_root = real[k] | (z[k] == z[place, rows]) | (z[k] == z[place, rows].conj())
+        is_certain &= is_same_root | (ratio[k] - errors[k] > min_ratio + error)
+    damped = np.where(has_growth, -1.0, np.where(real.all(axis=0), 1.0, 0.0))
+    is_between = damped == 0
+    return Bounded(min_ratio, error).where(is_between, Bounded(damped, np.zeros_like(damped))), is_certain | ~is_between

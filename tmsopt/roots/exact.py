@@ -13,8 +13,8 @@ from tmsopt.roots.polynomial import Root, rightmost_first
 def exact_roots(coefficients: Sequence[Any], digits: int = DIGITS) -> tuple[Root, ...]:
     """Roots of a polynomial with rational coefficients (descending), rightmost first.
 
-    The square-free factorisation gives the multiplicities, and ball arithmetic isolates the roots to `digits`; the
-    results are rounded to double precision.
+    The square-free factorisation gives the multiplicities. Ball arithmetic (intervals with a midpoint and a radius)
+    isolates the roots to `digits`. The results are rounded to double precision.
 
     Example:
         >>> [(s.re, s.im, s.multiplicity) for s in tmsopt.roots.exact_roots([1, 2, 2, 2, 1])]  # (s + 1)² (s² + 1)
@@ -27,7 +27,7 @@ def exact_roots(coefficients: Sequence[Any], digits: int = DIGITS) -> tuple[Root
 
 
 def isolated_roots(coefficients: Sequence[Any]) -> list[tuple[Any, int]]:
-    """The distinct roots as balls of the working precision, each with its multiplicity."""
+    """The distinct roots as balls (complex intervals) of the working precision, each with its multiplicity."""
     terms = [rational(c) for c in coefficients]
     common = math.lcm(*(int(term.q) for term in terms))
     polynomial: Any = flint.fmpz_poly([int(t * common) for t in reversed(terms)])

@@ -1,7 +1,7 @@
-"""Numeric roots that reproduce the coefficients of their polynomial to rounding.
+"""Computes numeric roots that reproduce the coefficients of their polynomial to rounding.
 
-Near a k-fold root each single root is uncertain by the k-th root of the rounding unit. Roots are therefore judged
-together, by the coefficients rebuilt from them.
+Near a k-fold root, each single root is uncertain by the k-th root of the rounding unit. Therefore the roots are judged
+together, by the coefficients that are rebuilt from them.
 """
 
 from collections.abc import Callable
@@ -18,17 +18,17 @@ Rows = Callable[[Array, NDArray[np.intp]], Array]
 GOOD = 4e-15
 """Backward error below which no Newton step is taken."""
 
-_LEAST_LEAD = 1e-300  # of the largest coefficient: their quotient must be a double
+_LEAST_LEAD = 1e-300  # smallest leading coefficient relative to the largest one: their quotient must be a double
 _STEPS = 6  # Newton's method doubles the digits at each step; companion eigenvalues start with 4 or more
-_ACCEPTED = 1e-13  # backward error above which the roots are isolated exactly, as for roots of very different size
+_ACCEPTED = 1e-13  # with a larger backward error the roots are isolated exactly, as for roots of very different size
 
 
 def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
     """All roots of real polynomials: coefficients of shape (…, n + 1), descending; roots of shape (…, n).
 
-    Companion eigenvalues, refined by Newton's method on the quadratic factors (and a linear factor for odd n); a step
-    counts only if it lowers the backward error. If that does not suffice, as for many roots of very different size,
-    exact arithmetic isolates the roots. Conjugate pairs are exact and adjacent.
+    Newton's method on the quadratic factors (and a linear factor for odd n) refines the eigenvalues of the companion
+    matrix. A step counts only if it lowers the backward error. If this does not suffice, for example for many roots of
+    very different size, exact arithmetic isolates the roots. Conjugate pairs are exact and adjacent.
 
     Raises:
         ValueError: for a leading coefficient 0 or coefficients that are not finite.
@@ -41,8 +41,8 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
     """
     c = validate_coefficients(coefficients, "roots")
     n = c.shape[-1] - 1
-    least = np.abs(c).max(axis=-1) * _LEAST_LEAD  # keeps roots within the range of doubles
-    lead = np.copysign(np.maximum(np.abs(c[..., 0]), least), c[..., 0])
+    min_lead = np.abs(c).max(axis=-1) * _LEAST_LEAD  # keeps roots within the range of doubles
+    lead = np.copysign(np.maximum(np.abs(c[..., 0]), min_lead), c[..., 0])
     with np.errstate(over="ignore", invalid="ignore"):  # a step that overflows is no improvement
         monic = (c / lead[..., None]).reshape(c[..., 0].size, n + 1)
         monic[:, 0] = 1
@@ -60,11 +60,11 @@ def roots(coefficients: ArrayLike) -> NDArray[np.complex128]:
             lambda trial, rows: backward_error(scaled[rows], _factor_roots(trial)[:, :n]),
             _STEPS,
         )
-        found = _factor_roots(factors)[:, :n] * scale[:, None]
-    clamped = (np.abs(c[..., 0]) < least).reshape(-1)
+        z = _factor_roots(factors)[:, :n] * scale[:, None]
+    clamped = (np.abs(c[..., 0]) < min_lead).reshape(-1)
     for row in np.flatnonzero(clamped | ~(error <= _ACCEPTED)):
-        found[row] = _isolate_roots(c.reshape(-1, n + 1)[row], found[row])
-    return found.reshape(*c.shape[:-1], n)
+        z[row] = _isolate_roots(c.reshape(-1, n + 1)[row], z[row])
+    return z.reshape(*c.shape[:-1], n)
 
 
 def validate_coefficients(coefficients: ArrayLike, caller: str) -> Array:
@@ -151,12 +151,12 @@ def _factors(values: NDArray[np.complex128]) -> Array:
 def _isolate_roots(coefficients: Array, numeric: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """The roots of one polynomial, correctly rounded, or the numeric ones if the roots exceed doubles."""
     each = [complex(z) for z, m in isolated_roots(coefficients.tolist()) for _ in range(m)]
-    exact = np.array(sorted(each, key=lambda z: (z.imag == 0, z.real, abs(z.imag), -z.imag)))
-    return exact if exact.shape == numeric.shape and np.all(np.isfinite(exact)) else numeric
+    isolated = np.array(sorted(each, key=lambda z: (z.imag == 0, z.real, abs(z.imag), -z.imag)))
+    return isolated if isolated.shape == numeric.shape and np.all(np.isfinite(isolated)) else numeric
 
 
 def polish(values: Array, error: Array, step: Rows, measure: Rows, steps: int) -> None:
-    """Newton steps on the rows of an array, in place, until the backward error is good or does not fall.
+    """Take Newton steps on the rows of an array, in place, until the backward error is good or does not fall.
 
     Args:
         step: function of some rows and their indices that takes a step.
@@ -168,9 +168,9 @@ def polish(values: Array, error: Array, step: Rows, measure: Rows, steps: int) -
             break
         trial = step(values[rows], rows)
         trial_error = measure(trial, rows)
-        better = trial_error < error[rows]
-        rows, trial_error = rows[better], trial_error[better]
-        values[rows], error[rows] = trial[better], trial_error
+        is_better = trial_error < error[rows]
+        rows, trial_error = rows[is_better], trial_error[is_better]
+        values[rows], error[rows] = trial[is_better], trial_error
         rows = rows[trial_error > GOOD]
 
 
@@ -183,16 +183,16 @@ def quadratic_roots(p: Array, q: Array) -> NDArray[np.complex128]:
 
 
 def _newton_step(factors: Array, monic: Array) -> Array:
-    """Newton step; where factors coincide and the Jacobian is singular, the shortest least-squares step."""
+    """Newton step; the shortest least-squares step if factors coincide, so that the Jacobian is singular."""
     rows, half, _ = factors.shape
     n = monic.shape[-1] - 1
-    others = [_multiply(np.delete(factors, k, axis=1)) for k in range(half)]
+    cofactors = [_multiply(np.delete(factors, k, axis=1)) for k in range(half)]
     residual = monic[:, 1:] - _multiply(factors)[:, 1 : n + 1]
     jacobian = np.zeros((rows, n, 2 * half))
-    for k, other in enumerate(others):
+    for k, cofactor in enumerate(cofactors):
         for column in (0, 1):  # d/dp gives a factor s, d/dq a factor 1
-            width = min(n - column, other.shape[-1])
-            jacobian[:, column : column + width, 2 * k + column] = other[:, :width]
+            width = min(n - column, cofactor.shape[-1])
+            jacobian[:, column : column + width, 2 * k + column] = cofactor[:, :width]
     radius = np.abs(_factor_roots(factors))
     size = rebuilt(-radius[:, :n])[:, 1:] + 1e-300
     unit = radius.reshape(rows, half, 2).max(axis=-1) + 1e-300

@@ -1,7 +1,7 @@
-"""Functions of the coefficients that change sign where two roots coincide, or where two roots add up to 0.
+"""Computes functions of the coefficients that change sign where two roots coincide, or where two roots add up to 0.
 
-Above degree 4 they come from numeric roots, and do not depend on the unit of the roots: the sign is the sign of the
-discriminant ∏ (zⱼ − zₖ)² or of Orlando's product ∏ (zⱼ + zₖ), the size is the relative size of its smallest factor,
+Above degree 4 they are computed from numeric roots, and do not depend on the unit of the roots. The sign is the sign of
+the discriminant ∏ (zⱼ − zₖ)² or of Orlando's product ∏ (zⱼ + zₖ). The size is the relative size of the smallest factor,
 because the size of a product of many factors has no meaning.
 """
 
@@ -49,12 +49,12 @@ def weave_test(coefficients: Coefficients) -> Any:
         return np.where(real, np.nan, value)
     minors = [1, *hurwitz_minors(coefficients)]
     # Where Δₙ₋₁ = 0 the pair is s² + W with W = aₙ Δₙ₋₃ / Δₙ₋₂, by Routh's array.
-    below = minors[n - 3] if n > 2 else coefficients[0]
-    return np.where(coefficients[-1] * minors[n - 2] * below > 0, minors[n - 1], np.nan)
+    third_minor = minors[n - 3] if n > 2 else coefficients[0]
+    return np.where(coefficients[-1] * minors[n - 2] * third_minor > 0, minors[n - 1], np.nan)
 
 
 def nearest_pair_mean(coefficients: Coefficients) -> Array:
-    """Mean real part of the two roots nearest to each other; for a double root as exact as the coefficients."""
+    """Mean real part of the two roots nearest to each other; for a double root, as exact as the coefficients."""
     if len(coefficients) == 3:
         return np.asarray(-coefficients[1] / 2 / coefficients[0], dtype=float)
     z = roots(np.stack(np.broadcast_arrays(*coefficients), axis=-1))
@@ -74,7 +74,7 @@ def _smallest_factor(coefficients: Sequence[Any], sums: bool) -> tuple[Array, ND
     regular = np.all(np.isfinite(c), axis=-1) & (c[..., 0] != 0)
     z = roots(np.where(regular[..., None], c, np.eye(1, c.shape[-1])[0]))
     size = np.abs(z)
-    sign, least, real = np.ones(z.shape[:-1]), np.full(z.shape[:-1], np.inf), np.zeros(z.shape[:-1], dtype=bool)
+    sign, min_factor, real = np.ones(z.shape[:-1]), np.full(z.shape[:-1], np.inf), np.zeros(z.shape[:-1], dtype=bool)
     for j, k in combinations(range(z.shape[-1]), 2):
         first, second = z[..., j], z[..., k]
         is_real = first.imag == -second.imag  # the other factors come in conjugate pairs, with a positive product
@@ -82,7 +82,7 @@ def _smallest_factor(coefficients: Sequence[Any], sums: bool) -> tuple[Array, ND
         sign = sign * np.where(is_real, np.sign(value), 1.0)
         scale = (size[..., j] + size[..., k] + 1e-300) ** (1 if sums else 2)
         factor = np.abs(first + second) / scale if sums else np.abs(first - second) ** 2 / scale
-        closer = factor < least
-        least = np.where(closer, factor, least)
+        closer = factor < min_factor
+        min_factor = np.where(closer, factor, min_factor)
         real = np.where(closer, (first.imag == 0) & (second.imag == 0), real)
-    return np.where(regular, sign * least, np.nan), real
+    return np.where(regular, sign * min_factor, np.nan), real

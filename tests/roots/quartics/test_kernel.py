@@ -5,6 +5,7 @@ Roots are judged by the coefficients that they rebuild, in the longest doubles o
 """
 
 from collections.abc import Callable
+from functools import partial
 from math import comb
 
 import numpy as np
@@ -146,6 +147,10 @@ def mixed(rng, n):
     return np.concatenate([rng.normal(size=(n // 2, 5)), near_ep4(rng, n - n // 2)])
 
 
+def in_unit_of_time(unit, rng, n):
+    return mixed(rng, n) * unit ** np.arange(5)
+
+
 FAMILIES = {
     "normal": lambda rng, n: rng.normal(size=(n, 5)),
     "positive": lambda rng, n: rng.uniform(0.01, 1, size=(n, 5)),
@@ -166,15 +171,10 @@ FAMILIES = {
     "2EP2 and CEP2 perturbed": lambda rng, n: perturbed(rng, two_equal_factors(rng, n)),
     "EP3": triple,
     "EP3 perturbed": lambda rng, n: perturbed(rng, triple(rng, n)),
-    "one tiny root": tiny(1),
-    "two tiny roots": tiny(2),
-    "three tiny roots": tiny(3),
+    **{f"tiny roots: {number}": tiny(number) for number in (1, 2, 3)},
     "roots at 0": ending_in_zeros,
     "coefficients of 0": with_holes,
-    "unit of time 1e8": lambda rng, n: mixed(rng, n) * 1e8 ** np.arange(5),
-    "unit of time 1e-8": lambda rng, n: mixed(rng, n) * 1e-8 ** np.arange(5),
-    "unit of time 1e60": lambda rng, n: mixed(rng, n) * 1e60 ** np.arange(5),
-    "unit of time 1e-60": lambda rng, n: mixed(rng, n) * 1e-60 ** np.arange(5),
+    **{f"unit of time {u}": partial(in_unit_of_time, u) for u in (1e8, 1e-8, 1e60, 1e-60)},
     "leading coefficient 1e-150": lambda rng, n: mixed(rng, n) * 1e-150,
 }
 

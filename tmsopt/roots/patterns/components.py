@@ -12,7 +12,7 @@ import numpy as np
 from tmsopt.roots.patterns.pattern import Roots, quadratic
 
 _PART = re.compile(r"(?P<count>[1-9]\d*)?(?P<kind>C?EP)(?P<order>[1-9]\d*)")
-_LARGEST = 12  # multiplicity and count
+_LARGEST = 12  # largest multiplicity, and largest count
 
 AXIS = {"weave": 2, "resonance": 4, "capsize": 1}
 """Patterns on the imaginary axis → number of their roots."""
@@ -71,9 +71,7 @@ class Component:
     @property
     def roots(self) -> int:
         """Number of roots."""
-        if self.kind in AXIS:
-            return AXIS[self.kind]
-        return self.count * self.order * (2 if self.kind == "CEP" else 1)
+        return sum(len(factor) - 1 for factor in self.factors([0] * len(self.unknowns)))
 
     @property
     def is_quadratic(self) -> bool:
@@ -83,55 +81,47 @@ class Component:
     @property
     def unknowns(self) -> tuple[str, ...]:
         """Names of the unknown coefficients of its factors."""
-        match self.kind:
-            case "capsize":
-                return ()
-            case "weave" | "resonance":
-                return ("W",)
-            case "CEP":
-                return ("b", "c") * self.count
-            case _:
-                return ("b", "c") if self.count == 2 else ("r",) * self.count
+        if self.kind in AXIS:
+            return () if self.kind == "capsize" else ("W",)
+        if self.is_quadratic:
+            return ("b", "c") * (self.count if self.kind == "CEP" else 1)
+        return ("r",) * self.count
 
     def factors(self, u: Sequence[Any]) -> list[list[Any]]:
         """Its monic factors, each repeated by its multiplicity."""
-        match self.kind:
-            case "capsize":
-                return [[1, 0]]
-            case "weave" | "resonance":
-                return [[1, 0, u[0]]] * (AXIS[self.kind] // 2)
+        if self.kind == "capsize":
+            return [[1, 0]]
+        if self.kind in AXIS:
+            return [[1, 0, u[0]]] * (AXIS[self.kind] // 2)
         if self.is_quadratic:
             return [[1, u[k], u[k + 1]] for k in range(0, len(u), 2)] * self.order
         return [[1, -r] for r in u] * self.order
 
     def nonnegative(self, u: Sequence[Any]) -> list[Any]:
         """Expressions of the unknowns that must be ≥ 0."""
-        if self.kind in ("weave", "resonance"):
-            return [u[0]]
         if not self.is_quadratic:
-            return []
+            return list(u) if self.kind in AXIS else []
         sign = 1 if self.kind == "EP" else -1
         return [sign * (u[k] * u[k] - 4 * u[k + 1]) for k in range(0, len(u), 2)]
 
     def guesses(self, z: Roots) -> list[list[float]]:
         """Guesses of the unknowns for numeric roots."""
-        match self.kind:
-            case "capsize":
-                return [[]]
-            case "weave":
-                return [[w] for w in _imaginary(z, 1)]
-            case "resonance":
-                return [[w] for w in _imaginary(z, 2)]
-        real, pairs = _real_means(z, self.order), _pair_means(z, self.order)
+        if self.kind == "capsize":
+            return [[]]
+        if self.kind in AXIS:  # W of s² + W for each pair, the nearest to the imaginary axis first
+            near_axis_first = z[np.argsort(np.abs(z.real), kind="stable")]
+            return [[c] for _, c in _pair_means(near_axis_first, AXIS[self.kind] // 2)]
         if self.kind == "CEP":
-            return [[x for pair in choice for x in pair] for choice in combinations(pairs, self.count)]
+            pairs = combinations(_pair_means(z, self.order), self.count)
+            return [[x for pair in choice for x in pair] for choice in pairs]
+        choices = [list(choice) for choice in combinations(_real_means(z, self.order), self.count)]
         if self.count != 2:
-            return [list(choice) for choice in combinations(real, self.count)]
-        return [quadratic(np.array([r, t], dtype=complex)) for r, t in combinations(real, 2)] + pairs
+            return choices
+        return [quadratic(np.array(choice, dtype=complex)) for choice in choices] + _pair_means(z, self.order)
 
 
 def parse_components(name: str) -> tuple[Component, ...]:
-    """Components of a pattern's name, each kind and order once; real roots and the highest multiplicity come first."""
+    """Components of the name of a pattern, each kind and order once; real roots and high multiplicities come first."""
     counts: Counter[tuple[str, int]] = Counter()
     axis = []
     for part in name.split("+"):
@@ -149,7 +139,7 @@ def parse_components(name: str) -> tuple[Component, ...]:
 
 
 def _real_means(z: Roots, order: int) -> list[float]:
-    """For each root, the mean real part of the `order` roots nearest to its real part."""
+    """For each root, the mean real part of the `order` roots that are nearest to its real part."""
     nearest = (z[np.argsort(np.abs(z - x), kind="stable")[:order]] for x in z.real)
     return _remove_repetitions(sorted(float(roots.real.mean()) for roots in nearest), z)
 
@@ -166,13 +156,8 @@ def _pair_means(z: Roots, order: int) -> list[list[float]]:
     return pairs
 
 
-def _imaginary(z: Roots, order: int) -> list[float]:
-    """W of s² + W for pairs, the nearest to the imaginary axis first."""
-    return [c for _, c in _pair_means(z[np.argsort(np.abs(z.real), kind="stable")], order)]
-
-
 def _remove_repetitions(values: list[float], z: Roots) -> list[float]:
-    """The distinct values; a single one is returned twice, for two roots that coincide."""
+    """The distinct values; a single value is returned twice, for two roots that coincide."""
     tolerance = 1e-12 * float(np.abs(z).max())
     distinct = [v for k, v in enumerate(values) if k == 0 or v - values[k - 1] > tolerance]
     return distinct if len(distinct) > 1 else distinct * 2

@@ -20,7 +20,7 @@ from tmsopt.roots.polynomial import evaluate, product as multiply_polynomials
 from tmsopt.roots.sign_tests import double_root_test, weave_test
 
 _MOST_GUESSES = 24
-_MOST_CHOICES = 512  # of roots, from which the nearest guesses are taken
+_MOST_CHOICES = 512  # choices of roots that are tried; the nearest of them are the guesses
 
 
 def pattern_names(degree: int) -> tuple[str, ...]:
@@ -62,31 +62,33 @@ def composition(name: str) -> list[tuple[str, int, int]]:
 @cache
 def _compose(name: str, degree: int) -> Pattern:
     components = parse_components(name)
-    others = degree - sum(c.roots for c in components)
-    if others < 0:
-        raise ValueError(f"'{name}' takes {degree - others} roots, and the polynomial has {degree}")
+    free_count = degree - sum(c.roots for c in components)
+    if free_count < 0:
+        raise ValueError(f"'{name}' takes {degree - free_count} roots, and the polynomial has {degree}")
     name = _join_names(name)
     letters = [u for c in components for u in c.unknowns]
     names = [f"{u}{letters[: k + 1].count(u)}" if letters.count(u) > 1 else u for k, u in enumerate(letters)]
-    rest = [f"{'d' if 'c' in letters else 'c'}{k}" for k in range(1, others + 1)]
+    free_names = [f"{'d' if 'c' in letters else 'c'}{k}" for k in range(1, free_count + 1)]
     starts = accumulate((len(c.unknowns) for c in components), initial=0)
     placed = [(c, slice(start, start + len(c.unknowns))) for c, start in zip(components, starts, strict=False)]
 
-    def factors(u: Sequence[Any], without: Collection[str] = ()) -> list[list[Any]]:
-        remainder = [[1, *u[len(letters) :]]] if others else []
-        return [f for c, s in placed if c.kind not in without for f in c.factors(u[s])] + remainder
+    def factors(u: Sequence[Any], omitted_kinds: Collection[str] = ()) -> list[list[Any]]:
+        remainder = [[1, *u[len(letters) :]]] if free_count else []
+        return [f for c, s in placed if c.kind not in omitted_kinds for f in c.factors(u[s])] + remainder
 
     composed = Pattern(
         name=name,
-        meaning=" and ".join(c.meaning for c in components) + (" and other roots" if others else ""),
-        unknowns=(*names, *rest),
+        meaning=" and ".join(c.meaning for c in components) + (" and other roots" if free_count else ""),
+        unknowns=(*names, *free_names),
         factors=factors,
-        guesses=partial(_guess_unknowns, components, others),
+        guesses=partial(_guess_unknowns, components, free_count),
         nonnegative=lambda u: [x for c, s in placed for x in c.nonnegative(u[s])],
-        abscissa=None if others or len(components) > 1 else _ABSCISSAE.get((components[0].kind, components[0].count)),
-        rest=partial(factors, without=AXIS) if any(c.kind in AXIS for c in components) else None,
+        abscissa=None
+        if free_count or len(components) > 1
+        else _ABSCISSAE.get((components[0].kind, components[0].count)),
+        rest=partial(factors, omitted_kinds=AXIS) if any(c.kind in AXIS for c in components) else None,
         test=_TESTS.get(name),
-        marks=_find_marks(placed, others),
+        marks=_find_marks(placed, free_count),
         ends={u: ENDS[c.kind] for c in components for u in c.unknowns if u == "W"} if "W" in names else {},
         degree=degree,
     )
@@ -100,29 +102,29 @@ _TESTS: Mapping[str, Any] = {"capsize": lambda a: a[-1], "weave": weave_test, "E
 """For patterns of codimension 1: a function of the coefficients that changes sign across the set."""
 
 
-def _find_marks(placed: Sequence[tuple[Component, slice]], others: int) -> dict[str, Any]:
-    """More special patterns that a curve may pass, each with an expression of the unknowns that is 0 there."""
+def _find_marks(placed: Sequence[tuple[Component, slice]], free_count: int) -> dict[str, Any]:
+    """Name of a more special pattern that a curve may pass → an expression of the unknowns that is 0 there."""
     marks: dict[str, Any] = {}
     roots = [(c, s.start) for c, s in placed if c.unknowns == ("r",)]
-    for (one, j), (other, k) in combinations(roots, 2):
-        rest = [c.name for c, _ in placed if c not in (one, other)]
-        marks[_join_names(f"EP{one.order + other.order}", *rest)] = lambda u, j=j, k=k: u[j] - u[k]
+    for (first, j), (second, k) in combinations(roots, 2):
+        remaining_names = [c.name for c, _ in placed if c not in (first, second)]
+        marks[_join_names(f"EP{first.order + second.order}", *remaining_names)] = lambda u, j=j, k=k: u[j] - u[k]
     if len(placed) > 1:
         return marks
-    ((only, own),) = placed
-    end = own.stop
+    ((only, place),) = placed
+    free_start = place.stop
     if only.is_quadratic and len(only.unknowns) == 2:
         marks[f"EP{2 * only.order}"] = lambda u: u[0] * u[0] - 4 * u[1]
-    if others and only.unknowns == ("r",):
-        marks[f"EP{only.order + 1}"] = lambda u: evaluate([1, *u[end:]], u[0])
+    if free_count and only.unknowns == ("r",):
+        marks[f"EP{only.order + 1}"] = lambda u: evaluate([1, *u[free_start:]], u[0])
         marks["double zero" if only.order == 2 else f"{only.order}-fold zero"] = lambda u: u[0]
-    if others and only.kind in ("EP", "CEP"):
+    if free_count and only.kind in ("EP", "CEP"):
         marks["capsize"] = lambda u: u[-1]
-    if others and only.kind == "capsize":
+    if free_count and only.kind == "capsize":
         marks["double zero"] = lambda u: u[-1]
-    if others > 1 and only.kind not in ("weave", "resonance"):
+    if free_count > 1 and only.kind not in ("weave", "resonance"):
         name = "EP2" if only.kind == "capsize" else _join_names(only.name, "EP2")
-        marks[name] = lambda u: double_root_test([1, *u[end:]])
+        marks[name] = lambda u: double_root_test([1, *u[free_start:]])
     return marks
 
 
@@ -131,8 +133,8 @@ def _join_names(*names: str) -> str:
     return "+".join(c.name for c in parse_components("+".join(names)))
 
 
-def _guess_unknowns(components: tuple[Component, ...], others: int, z: Roots) -> list[list[float]]:
-    """Unknowns of the components from choices of the roots z, the free factor by least squares; the nearest first."""
+def _guess_unknowns(components: tuple[Component, ...], free_count: int, z: Roots) -> list[list[float]]:
+    """Unknowns of the components from choices of the roots z, with the free factor by least squares; nearest first."""
     target = rebuilt(z)
     largest = np.abs(z).max()
     size = rebuilt(-np.abs(z) - 1e-3 * (largest if largest ** len(z) > 0 else 1.0))  # all may be 0
@@ -140,10 +142,10 @@ def _guess_unknowns(components: tuple[Component, ...], others: int, z: Roots) ->
     for choice in islice(product(*(c.guesses(z) for c in components)), _MOST_CHOICES):
         factors = (f for c, u in zip(components, choice, strict=True) for f in c.factors(u))
         fixed = np.array(multiply_polynomials(*factors), dtype=float)
-        columns = np.stack([np.convolve(fixed, unit) for unit in np.eye(others + 1)], axis=1) / size[:, None]
-        rest = np.linalg.lstsq(columns[:, 1:], target / size - columns[:, 0], rcond=None)[0]
-        mismatch = float(np.linalg.norm(columns[:, 0] + columns[:, 1:] @ rest - target / size))
-        mismatches[(*(x for u in choice for x in u), *rest.tolist())] = mismatch
+        columns = np.stack([np.convolve(fixed, unit) for unit in np.eye(free_count + 1)], axis=1) / size[:, None]
+        free_coefficients = np.linalg.lstsq(columns[:, 1:], target / size - columns[:, 0], rcond=None)[0]
+        mismatch = float(np.linalg.norm(columns[:, 0] + columns[:, 1:] @ free_coefficients - target / size))
+        mismatches[(*(x for u in choice for x in u), *free_coefficients.tolist())] = mismatch
     return [list(u) for u in sorted(mismatches, key=mismatches.__getitem__)[:_MOST_GUESSES]]
 
 

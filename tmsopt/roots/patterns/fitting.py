@@ -1,4 +1,4 @@
-"""Finds the polynomial of a factored form nearest to a given one, by least squares on relative coefficient changes."""
+"""Finds the polynomial of a factored form that is nearest to a given one, by least squares on relative changes."""
 
 from collections.abc import Sequence
 from typing import Any, Protocol
@@ -11,8 +11,8 @@ from tmsopt.roots.numeric import rebuilt
 
 Roots = NDArray[np.complex128]
 
-_STEPS = 20
-_RESOLVED = 1e6  # rounding errors above which a coefficient is not 0 by a solver's work, which leaves some hundreds
+_STEPS = 20  # of Gauss–Newton
+_RESOLVED = 1e6  # a coefficient of more rounding errors is surely not 0; a solver leaves some hundreds of them
 _ROUNDINGS = 16  # rounding errors of every parameter that a solver may leave in its equations
 
 
@@ -24,8 +24,8 @@ class Form(Protocol):
         ...
 
 
-def term_sizes(z: Roots, monic: Array | None = None, off: Array | None = None, tolerance: float = 0.0) -> Array:
-    """Sizes of the terms whose sums are the monic coefficients.
+def term_sizes(z: Roots, monic: Array | None = None, errors: Array | None = None, tolerance: float = 0.0) -> Array:
+    """Sizes of the terms whose sums are the monic coefficients, for relative changes of the coefficients.
 
     A root below a thousandth of the median root (of the largest root, if the median is 0) counts as that size, so that
     a coefficient that is 0 because of a root at 0 is judged by the size of the other roots and not by its rounding.
@@ -33,17 +33,17 @@ def term_sizes(z: Roots, monic: Array | None = None, off: Array | None = None, t
     Args:
         z: roots of the polynomial.
         monic: the coefficients.
-        off: rounding errors of the coefficients. A coefficient far above its error, as in a stiff system, is small but
-            not 0, and is judged by the true sizes of the roots.
+        errors: rounding errors of the coefficients. A coefficient far above its error, as in a stiff system, is small
+            but not 0. It is judged by the true sizes of the roots.
         tolerance: relative change that must cover some rounding errors, because a small difference of large numbers is
             not accurate relative to its own size.
     """
     radius = np.abs(z)
     floor = 1e-3 * float(np.median(radius) or radius.max())
     size = rebuilt(-np.maximum(radius, floor))
-    if monic is not None and off is not None:
-        size = np.where(np.abs(monic) > _RESOLVED * off, rebuilt(-radius), size)
-        size = np.maximum(size, _ROUNDINGS * off / tolerance) if tolerance else size
+    if monic is not None and errors is not None:
+        size = np.where(np.abs(monic) > _RESOLVED * errors, rebuilt(-radius), size)
+        size = np.maximum(size, _ROUNDINGS * errors / tolerance) if tolerance else size
     return np.maximum(size, 1e-100)
 
 
@@ -57,25 +57,25 @@ def gauss_newton(form: Form, guess: Array, monic: Array, size: Array, patience: 
 
     Args:
         guess: unknowns to start from.
-        patience: steps that may fail to lower the distance by a tenth before the best unknowns are returned.
+        patience: number of successive steps that may fail to lower the distance by a tenth; then the fit ends.
     """
     u = best = guess
     if not guess.size:
         return guess
-    least, left = np.inf, patience
+    best_distance, patience_left = np.inf, patience
     directions = 1e-100j * np.eye(len(u))
     for _ in range(_STEPS):
-        shifted = np.stack(np.broadcast_arrays(*form.monic([x + d for x, d in zip(u, directions, strict=True)])))
-        jacobian = shifted.imag / 1e-100 / size[:, None]
+        coefficients = np.stack(np.broadcast_arrays(*form.monic([x + d for x, d in zip(u, directions, strict=True)])))
+        jacobian = coefficients.imag / 1e-100 / size[:, None]
         residual = (np.array(form.monic(list(u)), dtype=float) - monic) / size
         if not (np.all(np.isfinite(jacobian)) and np.all(np.isfinite(residual))):
             break
         with np.errstate(over="ignore"):  # if it diverges
             distance = float(np.linalg.norm(residual))
-        left = patience if distance < 0.9 * least else left - 1
-        if distance < least:
-            best, least = u, distance
-        if not left:
+        patience_left = patience if distance < 0.9 * best_distance else patience_left - 1
+        if distance < best_distance:
+            best, best_distance = u, distance
+        if not patience_left:
             return best
         length = np.linalg.norm(jacobian, axis=0)
         length[~(length > 0)] = 1.0

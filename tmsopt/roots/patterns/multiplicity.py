@@ -1,9 +1,9 @@
 """Finds the multiple roots of a polynomial, and the roots on its rightmost vertical line, within a tolerance.
 
-The numeric roots do not show a k-fold root, since they scatter by the k-th root of the rounding unit. But it is a
-simple root of the (k−1)-th derivative, so well determined. Multiplicities are therefore tried at the roots of the
-derivatives, from the highest down. One is accepted if a polynomial with it and those accepted before lies within the
-tolerance; its factor is divided out before the next is tried.
+The numeric roots do not show a k-fold root, since they scatter by the k-th root of the rounding unit. But a k-fold root
+is a simple root of the (k−1)-th derivative, and therefore well determined. Multiplicities are tried at the roots of the
+derivatives, the highest first. A multiple root is accepted if a polynomial with this root and all roots accepted before
+lies within the tolerance. Its factor is divided out before the next root is tried.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,12 +16,12 @@ from tmsopt.roots.numeric import roots as numeric_roots
 from tmsopt.roots.patterns.fitting import gauss_newton, relative_distance, term_sizes
 from tmsopt.roots.patterns.shape import Group, Shape
 
-_NEARLY_REAL = 1e-2  # |Im z|/|z| up to which a root of a derivative may stand for a real root
-_LARGEST_CHANGE = 1e-6  # relative change of the coefficients that makes a place a multiple root, for a fit to be tried
-_LARGEST_FACTOR = 1e3  # the same relative to the tolerance: a root of a derivative need not be the best place
+_NEARLY_REAL = 1e-2  # a root of a derivative with |Im z|/|z| up to this may stand for a real root
+_LARGEST_CHANGE = 1e-6  # a fit is tried if a smaller relative change of the coefficients makes z a multiple root
+_LARGEST_FACTOR = 1e3  # the same relative to the tolerance, because a root of a derivative may not be the best place
 _MOST_FITS = 4  # for each multiplicity
 _PATIENCE = 2  # steps of a fit without progress
-_LARGEST_GAP = 1e-3  # relative to the largest root: difference of real parts that may be a tie
+_LARGEST_GAP = 1e-3  # real parts with a smaller difference, relative to the largest root, may be equal
 
 
 @dataclass(frozen=True)
@@ -38,32 +38,32 @@ class Fit:
 
     @property
     def places(self) -> list[complex]:
-        """One root of each group, of a pair the upper one."""
+        """One root of each group; the upper root of a pair."""
         return [_upper_root(factor) for factor in self.shape.group_factors(list(self.unknowns))]
 
     @property
-    def rest(self) -> Array:
+    def rest_factor(self) -> Array:
         """Coefficients of the factor with simple roots."""
         return np.array(self.shape.rest_factor(list(self.unknowns)), dtype=float)
 
 
 def find_multiple_roots(monic: Array, size: Array, limit: float, rounding: float) -> Fit:
-    """The shape with the most conditions within a relative distance, of several the nearest.
+    """The fit whose shape has the most conditions within a relative distance; of several fits, the nearest.
 
     Args:
         monic: coefficients in a unit near the size of the roots.
-        size: of the terms of each coefficient.
-        limit: of the relative distance.
-        rounding: distance that rounding alone explains.
+        size: size of the terms of each coefficient.
+        limit: largest relative distance.
+        rounding: distance that rounding alone can explain.
     """
     best = _tie_rightmost(monic, size, _find_groups(monic, size, limit), limit)
     if not best.shape.groups or best.distance <= rounding:
         return best
     # Distinct but close roots may look like one of higher multiplicity, so tighter limits are tried too.
-    for tighter in (rounding, np.sqrt(rounding * limit)):
-        if tighter < limit:
-            other = _tie_rightmost(monic, size, _find_groups(monic, size, tighter), limit)
-            best = max((best, other), key=lambda fit: (fit.shape.conditions, -fit.distance))
+    for smaller_limit in (rounding, np.sqrt(rounding * limit)):
+        if smaller_limit < limit:
+            trial = _tie_rightmost(monic, size, _find_groups(monic, size, smaller_limit), limit)
+            best = max((best, trial), key=lambda fit: (fit.shape.conditions, -fit.distance))
     return best
 
 
@@ -71,33 +71,33 @@ def _find_groups(monic: Array, size: Array, limit: float) -> Fit:
     """Multiple roots, the highest multiplicity first."""
     k = len(monic) - 1
     fit = Fit(Shape((), k), monic[1:], 0.0)
-    while (k := min(k, fit.shape.rest)) >= 2:
-        extended = _add_group(monic, size, fit, k, limit)
-        fit, k = (fit, k - 1) if extended is None else (extended, k)
+    while (k := min(k, fit.shape.rest_degree)) >= 2:
+        next_fit = _add_group(monic, size, fit, k, limit)
+        fit, k = (fit, k - 1) if next_fit is None else (next_fit, k)
     return fit
 
 
 def _add_group(monic: Array, size: Array, fit: Fit, k: int, limit: float) -> Fit | None:
     """The nearest polynomial with one more k-fold root; None if there is none within the limit."""
-    changes = [(_least_change(monic, size, z, Group(k, z.imag == 0)), z) for z in _find_places(fit.rest, k)]
-    most = max(_LARGEST_CHANGE, _LARGEST_FACTOR * limit)
-    places = [z for _, z in sorted((c for c in changes if c[0] <= most), key=lambda c: c[0])]
+    changes = [(_least_change(monic, size, z, Group(k, z.imag == 0)), z) for z in _find_places(fit.rest_factor, k)]
+    largest_change = max(_LARGEST_CHANGE, _LARGEST_FACTOR * limit)
+    places = [z for _, z in sorted((c for c in changes if c[0] <= largest_change), key=lambda c: c[0])]
     best = None
-    rest_size = term_sizes(numeric_roots(fit.rest)) if places else size
+    rest_size = term_sizes(numeric_roots(fit.rest_factor)) if places else size
     for z in places[:_MOST_FITS]:
         group = Group(k, z.imag == 0)
-        shape = Shape((*fit.shape.groups, group), fit.shape.rest - group.degree)
-        rest = _quotient(fit.rest, _power(z, group), rest_size)
-        trial = _fit_shape(shape, [*fit.places, z], rest, monic, size)
+        shape = Shape((*fit.shape.groups, group), fit.shape.rest_degree - group.degree)
+        rest_factor = _quotient(fit.rest_factor, _power(z, group), rest_size)
+        trial = _fit_shape(shape, [*fit.places, z], rest_factor, monic, size)
         if trial and trial.distance < (best.distance if best else limit):
             best = trial
     return best
 
 
-def _find_places(rest: Array, k: int) -> Iterator[complex]:
-    """Places of a possible k-fold root, on the real line or, if the degree allows a pair, in the upper half-plane."""
-    degree = len(rest) - 1
-    for z in numeric_roots(np.polyder(rest, k - 1)):
+def _find_places(rest_factor: Array, k: int) -> Iterator[complex]:
+    """Places of a possible k-fold root on the real line or, if the degree allows a pair, in the upper half-plane."""
+    degree = len(rest_factor) - 1
+    for z in numeric_roots(np.polyder(rest_factor, k - 1)):
         if z.imag >= 0 and z.imag <= _NEARLY_REAL * abs(z):
             yield complex(z.real, 0.0)
         if z.imag > 0 and 2 * k <= degree:
@@ -128,9 +128,9 @@ def _quotient(monic: Array, factor: Array, size: Array) -> Array:
     return np.concatenate([[1.0], tail])
 
 
-def _fit_shape(shape: Shape, places: Sequence[complex], rest: Array, monic: Array, size: Array) -> Fit | None:
+def _fit_shape(shape: Shape, places: Sequence[complex], rest_factor: Array, monic: Array, size: Array) -> Fit | None:
     """The nearest polynomial of a shape, from a start; None if a pair is not complex or the fit fails."""
-    u = gauss_newton(shape, np.array(shape.start(places, list(rest)), dtype=float), monic, size, _PATIENCE)
+    u = gauss_newton(shape, np.array(shape.start(places, list(rest_factor)), dtype=float), monic, size, _PATIENCE)
     distance = relative_distance(shape, u, monic, size)
     if not np.isfinite(distance) or any(not gap > 0 for gap in shape.gaps(list(u))):
         return None
@@ -138,21 +138,21 @@ def _fit_shape(shape: Shape, places: Sequence[complex], rest: Array, monic: Arra
 
 
 def _tie_rightmost(monic: Array, size: Array, fit: Fit, limit: float) -> Fit:
-    """The fit with as many roots on the rightmost vertical line as the limit allows."""
-    simple = [z for z in numeric_roots(fit.rest) if z.imag >= 0] if fit.shape.rest else []
-    items = [*zip(fit.places, fit.shape.groups, strict=True), *((z, Group(1, z.imag == 0)) for z in simple)]
+    """The fit with as many roots tied to the rightmost line as the limit allows; if none, the given fit."""
+    upper_roots = [z for z in numeric_roots(fit.rest_factor) if z.imag >= 0] if fit.shape.rest_degree else []
+    items = [*zip(fit.places, fit.shape.groups, strict=True), *((z, Group(1, z.imag == 0)) for z in upper_roots)]
     items.sort(key=lambda item: -item[0].real)
     gap = _LARGEST_GAP * max(abs(z) for z, _ in items)
     near_line = sum(z.real >= items[0][0].real - gap for z, _ in items)
     for count in range(near_line, 1, -1):
         if sum(g.real for _, g in items[:count]) <= 1:
-            tied = [(z, replace(g, tied=True)) for z, g in items[:count]]
-            others = [(z, g) for z, g in items[count:] if g.multiplicity > 1]
-            free = [z for z, g in items[count:] if g.multiplicity == 1]
-            places, groups = zip(*tied, *others, strict=True)
-            free_roots = [w for z in free for w in ((z, z.conjugate()) if z.imag else (z,))]
-            rest = np.atleast_1d(np.poly(np.array(free_roots))).real
-            trial = _fit_shape(Shape(tuple(groups), len(rest) - 1), places, rest, monic, size)
+            tied_roots = [(z, replace(g, tied=True)) for z, g in items[:count]]
+            multiple_roots = [(z, g) for z, g in items[count:] if g.multiplicity > 1]
+            simple_roots = [z for z, g in items[count:] if g.multiplicity == 1]
+            places, groups = zip(*tied_roots, *multiple_roots, strict=True)
+            free_roots = [w for z in simple_roots for w in ((z, z.conjugate()) if z.imag else (z,))]
+            rest_factor = np.atleast_1d(np.poly(np.array(free_roots))).real
+            trial = _fit_shape(Shape(tuple(groups), len(rest_factor) - 1), places, rest_factor, monic, size)
             if trial and trial.distance < limit:
                 return trial
     return fit

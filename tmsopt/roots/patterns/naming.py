@@ -1,4 +1,4 @@
-"""Shapes and patterns of given roots with multiplicities."""
+"""Finds shapes and patterns of given roots with multiplicities, and their names."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -21,15 +21,15 @@ def find_shape(roots: Sequence[Root], everywhere: bool = True, ties: bool = True
     upper = [r for r in roots if r.im >= 0]
     right = max(r.re for r in upper)
     has_ties = ties and sum(r.re == right for r in upper) > 1
-    grouped = [
+    root_groups = [
         (r, Group(r.multiplicity, r.im == 0, has_ties and r.re == right))
         for r in upper
         if (has_ties and r.re == right) or (r.multiplicity > 1 and (everywhere or r.re == right))
     ]
-    free = [r for r in upper for _ in range(r.multiplicity) if r not in [q for q, _ in grouped]]
-    rest = product(*([1, -r.re] if r.im == 0 else [1, -2 * r.re, r.re**2 + r.im**2] for r in free))
-    shape = Shape(tuple(g for _, g in grouped), len(rest) - 1)
-    return shape, shape.start([complex(r.re, r.im) for r, _ in grouped], rest)
+    free_roots = [r for r in upper for _ in range(r.multiplicity) if r not in [q for q, _ in root_groups]]
+    rest_factor = product(*([1, -r.re] if r.im == 0 else [1, -2 * r.re, r.re**2 + r.im**2] for r in free_roots))
+    shape = Shape(tuple(g for _, g in root_groups), len(rest_factor) - 1)
+    return shape, shape.start([complex(r.re, r.im) for r, _ in root_groups], rest_factor)
 
 
 def find_patterns(roots: Sequence[Root]) -> list[Pattern]:
@@ -46,12 +46,12 @@ def find_patterns(roots: Sequence[Root]) -> list[Pattern]:
 
 
 def _make_pattern(shape: Shape, start: Sequence[Any]) -> Pattern:
-    tied, others = ([g for g in shape.groups if g.tied is on] for on in (True, False))
-    places = ((tied, " on one vertical line"), (others, ""))
+    tied, untied = ([g for g in shape.groups if g.tied is on] for on in (True, False))
+    places = ((tied, " on one vertical line"), (untied, ""))
     meanings = [_describe_groups(groups) + place for groups, place in places if groups]
     return Pattern(
-        name=" beside ".join(_name_groups(groups) for groups in (tied, others) if groups),
-        meaning=", and ".join(meanings) + (" and other roots" if shape.rest else ""),
+        name=" beside ".join(_name_groups(groups) for groups in (tied, untied) if groups),
+        meaning=", and ".join(meanings) + (" and other roots" if shape.rest_degree else ""),
         unknowns=shape.unknowns,
         factors=shape.factors,
         guesses=lambda z: [[float(x) for x in start]],

@@ -23,7 +23,7 @@ Roots = NDArray[np.complex128]
 _NAME = "<U32"
 
 _UNRELATED = tuple(p**0.5 for p in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37))
-"""Values of the unknowns without rational relations, to recognise equal factors."""
+"""Values of the unknowns without rational relations. For these values only identical factors are equal."""
 
 
 @dataclass(frozen=True)
@@ -109,11 +109,11 @@ class Pattern:
 
     def kind(self, unknowns: Sequence[Any]) -> NDArray[np.str_]:
         """Name of the pattern at each point. 2EP2 and CEP2 form one set; the sign of b² − 4c distinguishes them."""
-        plain = self.name.removeprefix("2").removeprefix("C")
-        if self.doubles or self.name not in (f"2{plain}", f"C{plain}"):
+        base_name = self.name.removeprefix("2").removeprefix("C")
+        if self.doubles or self.name not in (f"2{base_name}", f"C{base_name}"):
             return np.full(np.shape(unknowns[0]), self.name, dtype=_NAME)
         b, c = unknowns[:2]
-        return np.where(b * b - 4 * c >= 0, f"2{plain}", f"C{plain}").astype(_NAME)
+        return np.where(b * b - 4 * c >= 0, f"2{base_name}", f"C{base_name}").astype(_NAME)
 
 
 def mean_size(monic: Sequence[Any]) -> NDArray[np.float64]:
@@ -132,8 +132,12 @@ def _choose_two(roots: Roots) -> list[tuple[Roots, Roots]]:
     """Every choice of two roots that is closed under conjugation, with the other roots."""
     indices = range(len(roots))
     choices = [(roots[list(c)], roots[[k for k in indices if k not in c]]) for c in combinations(indices, 2)]
-    close = 1e-9 * (np.abs(roots).max() + 1e-300)
-    return [(a, b) for a, b in choices if abs(a.sum().imag) <= close and abs(a.prod().imag) <= close * np.abs(a).max()]
+    tolerance = 1e-9 * (np.abs(roots).max() + 1e-300)
+    return [
+        (a, b)
+        for a, b in choices
+        if abs(a.sum().imag) <= tolerance and abs(a.prod().imag) <= tolerance * np.abs(a).max()
+    ]
 
 
 def _double_quadratic_guess(roots: Roots) -> list[list[float]]:
@@ -145,8 +149,8 @@ def _double_quadratic_guess(roots: Roots) -> list[list[float]]:
 
 
 def _triple_guesses(roots: Roots) -> list[list[float]]:
-    simple = roots[np.abs(roots.imag) <= 1e-2 * np.abs(roots) + 1e-300].real
-    return [[(roots.sum().real - t) / 3, float(t)] for t in simple] or [[float(roots.mean().real)] * 2]
+    simple_roots = roots[np.abs(roots.imag) <= 1e-2 * np.abs(roots) + 1e-300].real
+    return [[(roots.sum().real - t) / 3, float(t)] for t in simple_roots] or [[float(roots.mean().real)] * 2]
 
 
 def _pair_test(a: Sequence[Any]) -> Any:

@@ -1,10 +1,12 @@
-"""Encloses the roots of a polynomial with ball coefficients, and of the nearest polynomial with a structure.
+"""Encloses the roots of a polynomial, and of the nearest polynomial with a structure.
+
+Coefficients and roots are balls: intervals with a midpoint and a radius.
 
 The precision is that of `flint.ctx`.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 from itertools import combinations
@@ -19,10 +21,10 @@ from tmsopt.roots.patterns.naming import find_shape
 from tmsopt.roots.patterns.shape import Shape
 from tmsopt.roots.polynomial import Root, evaluate, product, rightmost_first
 
-_STEPS = 80
-_FLOOR = 1000  # roots smaller than the median root by a larger factor count as smaller by this factor
-_LOST_BITS = 7.5  # for each degree, in the normal equations
-_TRUSTED = 2  # a converged fit is trusted to this part of its bits: a half
+_STEPS = 80  # of Gauss–Newton
+_FLOOR = 1000  # median root divided by the size of the smallest root in the sizes of terms
+_LOST_BITS = 7.5  # in the normal equations, for each degree
+_TRUSTED = 2  # half of the bits of a converged fit are trusted
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ def nearest_roots(coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[E
 
     The nearest polynomial minimises the sum over k = 1 … n of (Δₖ/wₖ)². Here Δₖ is the change of the k-th coefficient
     of the monic polynomial, and wₖ is the k-th coefficient of ∏ (s + |zᵢ|) with the roots zᵢ of the nearest polynomial;
-    |zᵢ| below a thousandth of the median (of the largest, if the median is 0) counts as that. The unknowns u of the
+    |zᵢ| is at least a thousandth of the median (of the largest, if the median is 0). The unknowns u of the
     factored form solve Σₖ Δₖ(u)/wₖ(u)² · ∂Δₖ/∂uⱼ = 0 for each j, without the derivatives of wₖ, so that they depend on
     the coefficients only.
 
@@ -127,7 +129,7 @@ def nearest_roots(coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[E
 def _fit_shape(shape: Shape, u: list[Any], target: Sequence[Any]) -> tuple[EnclosedRoot, ...] | None:
     """Roots of the nearest polynomial of a shape, from a start."""
     small = flint.arb(2) ** (_LOST_BITS * (len(target) - 1) - flint.ctx.prec)
-    trusted = flint.arb(2) ** (-flint.ctx.prec // _TRUSTED)
+    relative_radius = flint.arb(2) ** (-flint.ctx.prec // _TRUSTED)
     for _ in range(_STEPS):
         step = _step(shape, u, target)
         if step is None:
@@ -135,41 +137,36 @@ def _fit_shape(shape: Shape, u: list[Any], target: Sequence[Any]) -> tuple[Enclo
         u = [(x + d).mid() for x, d in zip(u, step, strict=True)]
         size = max(abs(x) for x in u)
         if all(abs(d) <= small * size for d in step):
-            roots = _shape_roots(shape, [x + flint.arb(0, (size * trusted).upper()) for x in u])
+            roots = _shape_roots(shape, [x + flint.arb(0, (size * relative_radius).upper()) for x in u])
             return None if roots is None else rightmost_first(roots)
     return None
 
 
 def nearest_double(ball: Any) -> float | None:
     """The double that a ball rounds to; None if its ends round differently, nan if it is not finite."""
-    if not _finite(ball):
-        return float("nan")
-    ends = {_double(end) for end in _ends(ball)}
-    return ends.pop() + 0.0 if len(ends) == 1 else None
+    return _round_ball(ball, _round_to_double)
 
 
 def nearest_decimal(ball: Any, digits: int) -> float | None:
     """As `nearest_double`, after rounding the ball to a number of significant decimal digits."""
-    if not _finite(ball):
-        return float("nan")
     context = Context(prec=digits, rounding=ROUND_HALF_EVEN)
-    ends = {context.divide(Decimal(int(e.p)), Decimal(int(e.q))) for e in _ends(ball)}
-    return float(ends.pop()) + 0.0 if len(ends) == 1 else None
+    return _round_ball(ball, lambda end: context.divide(Decimal(int(end.p)), Decimal(int(end.q))))
 
 
-def _finite(ball: Any) -> bool:
-    return ball.is_finite() if isinstance(ball, flint.arb) else isinstance(ball, flint.fmpq)
-
-
-def _ends(ball: Any) -> tuple[flint.fmpq, ...]:
-    """Both ends without rounding, at any working precision."""
+def _round_ball(ball: Any, round_end: Callable[[flint.fmpq], float | Decimal]) -> float | None:
+    """The number to which both ends of a ball, as exact fractions, round."""
     if isinstance(ball, flint.fmpq):
-        return (ball,)
-    middle, radius = rational(ball.mid()), rational(ball.rad())
-    return middle - radius, middle + radius
+        ends = [ball]
+    elif isinstance(ball, flint.arb) and ball.is_finite():
+        middle, radius = rational(ball.mid()), rational(ball.rad())
+        ends = [middle - radius, middle + radius]
+    else:
+        return float("nan")
+    numbers = {round_end(end) for end in ends}
+    return float(numbers.pop()) + 0.0 if len(numbers) == 1 else None
 
 
-def _double(x: flint.fmpq) -> float:
+def _round_to_double(x: flint.fmpq) -> float:
     try:
         return int(x.p) / int(x.q)  # correctly rounded for integers of any length
     except OverflowError:
@@ -177,7 +174,7 @@ def _double(x: flint.fmpq) -> float:
 
 
 def _shape_roots(shape: Shape, u: Sequence[Any]) -> list[EnclosedRoot] | None:
-    """Roots of all groups and of the rest; None if undecided."""
+    """Roots of all groups and of the factor with free coefficients; None if the balls are too wide to decide."""
     roots: list[EnclosedRoot] = []
     factors = [*shape.group_factors(u), shape.rest_factor(u)]
     for factor, count in zip(factors, [*(g.multiplicity for g in shape.groups), 1], strict=True):
@@ -195,8 +192,8 @@ def _step(shape: Shape, u: Sequence[Any], target: Sequence[Any]) -> list[Any] | 
         return None
     weights = _weights(roots)
     residual = flint.arb_mat([[(b - a) / w] for a, b, w in zip(shape.monic(u), target, weights, strict=True)])
-    at = dict(zip(shape.unknowns, u, strict=True))
-    slopes = jacobian(lambda values: shape.monic([*values.values()]), at, shape.unknowns)
+    unknowns = dict(zip(shape.unknowns, u, strict=True))
+    slopes = jacobian(lambda values: shape.monic([*values.values()]), unknowns, shape.unknowns)
     rows = flint.arb_mat([[slope / w for slope in row] for row, w in zip(slopes.tolist(), weights, strict=True)])
     try:
         return list((rows.transpose() * rows).solve(rows.transpose() * residual))

@@ -20,9 +20,9 @@ ROUNDING = 8 * np.finfo(float).eps
 HIGHEST = 12
 """Highest degree of a polynomial whose structure can be decided."""
 
-_BOUNDARY = 1e-10  # of the squared root size: a pattern contains its boundary, as CEP2 and 2EP2 contain EP4
+_BOUNDARY = 1e-10  # relative to the squared size of the roots: a pattern contains its boundary, as CEP2 contains EP4
 _LARGEST_EXPONENT = 1023  # of 2 in a double
-_ZERO = np.finfo(float).eps ** 2  # of the largest root: real parts below it are rounding errors of a fit in doubles
+_ZERO = np.finfo(float).eps ** 2  # smaller real parts, relative to the largest root, are rounding errors of a fit
 
 
 @dataclass(frozen=True)
@@ -87,9 +87,9 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike 
     fit = find_multiple_roots(monic, size, tolerance + rounding, rounding)
     if fit.distance < tolerance - rounding or not fit.shape.groups:
         return _make_structure(fit, z, unit)
-    definite = _make_structure(find_multiple_roots(monic, size, tolerance - rounding, rounding), z, unit)
-    if definite.name not in ("pair", "real"):
-        return definite
+    certain_structure = _make_structure(find_multiple_roots(monic, size, tolerance - rounding, rounding), z, unit)
+    if certain_structure.name not in ("pair", "real"):
+        return certain_structure
     return Structure("undecided", _simple_roots(z), fit.distance)
 
 
@@ -137,9 +137,9 @@ def pattern_distance(
         fits, z = _fit_pattern(pattern, coefficients, off, tolerance)
     except ValueError:
         return float("inf")
-    least = -_BOUNDARY * np.abs(z).max() ** 2
-    inside = (distance for distance, u in fits if all(value >= least for value in pattern.nonnegative(u)))
-    return next(inside, float("inf"))
+    lower_bound = -_BOUNDARY * np.abs(z).max() ** 2
+    distances = (distance for distance, u in fits if all(value >= lower_bound for value in pattern.nonnegative(u)))
+    return next(distances, float("inf"))
 
 
 def fit_unknowns(pattern: Pattern, coefficients: ArrayLike) -> list[list[float]]:
@@ -153,7 +153,7 @@ def _fit_pattern(
     """Distance and unknowns of the fit from each guess, the nearest first, and the numeric roots.
 
     Raises:
-        ValueError: for coefficients of another degree than the pattern's.
+        ValueError: if the degree of the polynomial is not that of the pattern.
     """
     c = _validate(coefficients)
     if len(c) - 1 != pattern.degree:
@@ -166,7 +166,7 @@ def _fit_pattern(
 
 
 def guess_distance(pattern: Pattern, coefficients: Array, z: Roots) -> float:
-    """Relative distance of a polynomial with roots z from the best guess of a pattern, without a fit; inf if none."""
+    """Relative distance from a polynomial with roots z to the best guess of a pattern; inf if there is no guess."""
     size, monic = term_sizes(z), coefficients / coefficients[0]
     return min((relative_distance(pattern, g, monic, size) for g in pattern.guesses(z)), default=float("inf"))
 
@@ -187,12 +187,12 @@ def _make_structure(fit: Fit, numeric: Roots, unit: float) -> Structure:
     if not fit.shape.groups:
         return Structure("pair" if numeric[np.argmax(numeric.real)].imag else "real", _simple_roots(numeric), 0.0)
     upper = [(z * unit, group.multiplicity) for z, group in zip(fit.places, fit.shape.groups, strict=True)]
-    upper += [(z * unit, 1) for z in (numeric_roots(fit.rest) if fit.shape.rest else ()) if z.imag >= 0]
+    upper += [(z * unit, 1) for z in (numeric_roots(fit.rest_factor) if fit.shape.rest_degree else ()) if z.imag >= 0]
     right = max(z.real for z, _ in upper)
     line = [Group(multiplicity, z.imag == 0) for z, multiplicity in upper if z.real == right]
-    least = _ZERO * max(abs(z) for z, _ in upper)
-    every = ((w, m) for z, m in upper for w in ((z, z.conjugate()) if z.imag else (z,)))
-    roots = [Root(float(w.real) if abs(w.real) > least else 0.0, float(w.imag), m) for w, m in every]
+    zero_size = _ZERO * max(abs(z) for z, _ in upper)
+    all_roots = ((w, m) for z, m in upper for w in ((z, z.conjugate()) if z.imag else (z,)))
+    roots = [Root(float(w.real) if abs(w.real) > zero_size else 0.0, float(w.imag), m) for w, m in all_roots]
     two_double = [(root.im, root.multiplicity) for root in roots] == [(0.0, 2), (0.0, 2)]
     return Structure("2EP2" if two_double else _name_line(line), rightmost_first(roots), fit.distance)
 

@@ -44,9 +44,9 @@ def start(b1: Real, b2: Real, b3: Real, b4: Real) -> Four:
     residual = ((U + 2.0 * B) * U + E) * U - C2
     for _ in range(2):
         trial = np.maximum(U - residual / ((3.0 * U + 4.0 * B) * U + E), 0.0)
-        left = ((trial + 2.0 * B) * trial + E) * trial - C2
-        better = np.abs(left) < np.abs(residual)
-        U, residual = where(better, trial, U), where(better, left, residual)
+        trial_residual = ((trial + 2.0 * B) * trial + E) * trial - C2
+        is_better = np.abs(trial_residual) < np.abs(residual)
+        U, residual = where(is_better, trial, U), where(is_better, trial_residual, residual)
     u = np.sqrt(U)
     sum_, difference = B + U, where(u > 0.0, C / u, np.sqrt(np.maximum(E, 0.0)))
     v, w = correct_smaller(0.5 * (sum_ - difference), 0.5 * (sum_ + difference), D)
@@ -138,5 +138,10 @@ def root_pair(p: Real, q: Real) -> Four:
     width = np.sqrt(np.abs(square))
     far = half + where(half < 0.0, -1.0, 1.0) * where(q == 0.0, np.abs(half), width)
     near = where(far == 0.0, 0.0, q / far)
-    paired = square < 0.0
-    return where(paired, half, far), where(paired, width, 0.0), where(paired, half, near), where(paired, -width, 0.0)
+    is_pair = square < 0.0
+    return (
+        where(is_pair, half, far),
+        where(is_pair, width, 0.0),
+        where(is_pair, half, near),
+        where(is_pair, -width, 0.0),
+    )

@@ -117,8 +117,8 @@ def flatten_columns(*coefficients: ArrayLike) -> tuple[list[Array], tuple[int, .
     Raises:
         ValueError: for shapes that cannot be broadcast.
     """
-    given = np.broadcast_arrays(*[np.asarray(c, dtype=float) for c in coefficients])
-    return [np.ascontiguousarray(c).reshape(-1) for c in given], given[0].shape
+    columns = np.broadcast_arrays(*[np.asarray(c, dtype=float) for c in coefficients])
+    return [np.ascontiguousarray(c).reshape(-1) for c in columns], columns[0].shape
 
 
 def make_blocks(size: int) -> list[slice]:

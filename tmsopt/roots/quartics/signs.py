@@ -54,17 +54,17 @@ def classes(a0: Real, a1: Real, a2: Real, a3: Real, a4: Real) -> tuple[Any, Any,
     b_, c_, d_, e_ = np.abs(b), np.abs(c), np.abs(d), np.abs(e)
     entries = chain(a, b, c, d, e, -1.0)
     A0, C0, L0, M0, N0, d0, e0 = (x > 0.0 for x in (*entries, d, e))
-    certain = (a >= _LEAST) & (a <= _MOST) & (d_ >= _LEAST) & (d_ <= _MOST) & (e_ >= _LEAST) & (e_ <= _MOST)
-    certain = certain & (b_ <= _MOST) & (c_ <= _MOST)
-    certain = certain & ((b_ >= _LEAST) | (b_ == 0.0)) & ((c_ >= _LEAST) | (c_ == 0.0))
+    is_certain = (a >= _LEAST) & (a <= _MOST) & (d_ >= _LEAST) & (d_ <= _MOST) & (e_ >= _LEAST) & (e_ <= _MOST)
+    is_certain = is_certain & (b_ <= _MOST) & (c_ <= _MOST)
+    is_certain = is_certain & ((b_ >= _LEAST) | (b_ == 0.0)) & ((c_ >= _LEAST) | (c_ == 0.0))
     for x, terms in zip(entries, chain(a, b_, c_, d_, e_, 1.0), strict=True):
-        certain = certain & (np.abs(x) > _BOUND * terms)
+        is_certain = is_certain & (np.abs(x) > _BOUND * terms)
     # Sign changes at −∞ of (+, −, A, −L, N), at 0 of (e, d, C, M, N), at ∞ of (+, +, A, L, N).
-    left = 1 + one(A0) + one(A0 == L0) + one(L0 == N0)
-    middle = one(e0 != d0) + one(d0 != C0) + one(C0 != M0) + one(M0 != N0)
-    right = 1 - one(A0) + one(A0 != L0) + one(L0 != N0)
-    negative, count = left - middle, left - right
+    changes_at_minus_infinity = 1 + one(A0) + one(A0 == L0) + one(L0 == N0)
+    changes_at_zero = one(e0 != d0) + one(d0 != C0) + one(C0 != M0) + one(M0 != N0)
+    changes_at_infinity = 1 - one(A0) + one(A0 != L0) + one(L0 != N0)
+    negative, count = changes_at_minus_infinity - changes_at_zero, changes_at_minus_infinity - changes_at_infinity
     is_stable = stable(a0, a1, a2, a3, a4)
     # A stable quartic has no real root ≥ 0, so its code needs the count only.
     kind = where(is_stable, 3 + one(negative == 4), 2 - one(count > negative))
-    return kind, count, ~certain
+    return kind, count, ~is_certain
