@@ -15,7 +15,7 @@ POSITIVE = 1e-7
 """Smallest multiplier (rows and gradient of length 1) whose sign is significant; residuals are 1e-12."""
 
 _RANK = 1e-9  # singular value of rows of length 1 below which they are dependent
-_CURVED = 1e-7  # smallest curvature, relative to the largest, whose sign is significant
+_MIN_CURVATURE = 1e-7  # smallest curvature, relative to the largest, whose sign is significant
 
 
 @dataclass(frozen=True)
@@ -59,21 +59,23 @@ def evaluate_conditions(program: LocalProgram) -> Conditions:
 
         least = np.where(signed, 0.0, -np.inf)
         allowed = lsq_linear(unit.T, target, bounds=(least, np.inf), method="bvls", tol=1e-14).x
-        left = target - unit.T @ allowed
-        if np.linalg.norm(left) > STATIONARY:
-            downhill = -left * program.sizes  # the gradient minus its projection onto the cone of multipliers
+        residual_gradient = target - unit.T @ allowed
+        if np.linalg.norm(residual_gradient) > STATIONARY:
+            downhill = (
+                -residual_gradient * program.sizes
+            )  # the gradient minus its projection onto the cone of multipliers
         y = y if independent else allowed
     residual = float(np.linalg.norm(target - unit.T @ y))
     multipliers, firm = y * steepness / lengths, ~signed | (y > POSITIVE)
     if not downhill.any():
-        curvature, along = _curvature(program, multipliers, unit[firm], steepness)
-        downhill = along * program.sizes if curvature < -_CURVED else downhill
+        curvature, direction = _curvature(program, multipliers, unit[firm], steepness)
+        downhill = direction * program.sizes if curvature < -_MIN_CURVATURE else downhill
     return Conditions(multipliers, y, residual, independent, downhill, curvature, firm)
 
 
 def curvature_sign(curvature: float) -> int:
     """Sign of a curvature; 0 within rounding, and for nan."""
-    return int(curvature > _CURVED) - int(curvature < -_CURVED)
+    return int(curvature > _MIN_CURVATURE) - int(curvature < -_MIN_CURVATURE)
 
 
 def _curvature(program: LocalProgram, multipliers: Array, firm: Array, steepness: float) -> tuple[float, Array]:

@@ -17,11 +17,11 @@ from tmsopt.problem.solution import Solution
 from tmsopt.program.formulate import design_of
 from tmsopt.records import Array, Table
 
-_FIRST = 0.05  # longest step, relative to the sizes of the variables
-_RATIO = 4.0  # of successive steps
+_LONGEST_STEP = 0.05  # longest step, relative to the sizes of the variables
+_STEP_RATIO = 4.0  # of successive steps
 _STEPS = 9  # the shortest step is 7e-7 of the sizes
 _ITERATIONS = 12  # of Newton's method
-_BETTER = 1e-9  # smallest improvement, relative to the objective, that rounding does not explain
+_MIN_IMPROVEMENT = 1e-9  # smallest improvement, relative to the objective, that rounding does not explain
 
 
 @dataclass(frozen=True)
@@ -37,30 +37,30 @@ class BetterDesign:
     order: int
 
 
-def find_better_design(program: LocalProgram, found: Conditions, solution: Solution) -> BetterDesign | None:
+def find_better_design(program: LocalProgram, conditions: Conditions, solution: Solution) -> BetterDesign | None:
     """The design after the longest step downhill that improves; None without one."""
-    problem, order = program.problem, 2 if curvature_sign(found.curvature) < 0 else 1
+    problem, order = program.problem, 2 if curvature_sign(conditions.curvature) < 0 else 1
     reference = solution.abscissa if minimizes_abscissa(problem) else solution.value
-    for x in _downhill_points(program, found, both=order == 2):
+    for x in _downhill_points(program, conditions, both=order == 2):
         at = dict(zip(program.variables, x.tolist(), strict=True))
-        moved = design_of(problem, [at.get(n, 0.0) for n in problem.free])
-        moved |= {n: solution.parameters[n] for n in problem.free if n not in at}
-        checked = recheck(problem, parameters := problem.ordered(moved))
+        design = design_of(problem, [at.get(n, 0.0) for n in problem.free])
+        design |= {n: solution.parameters[n] for n in problem.free if n not in at}
+        checked = recheck(problem, parameters := problem.ordered(design))
         # the stored doubles must be better too
         value = max(checked.objective, checked.realised) if minimizes_abscissa(problem) else checked.objective
-        if not checked.violations and problem.sign * (reference - value) > _BETTER * (1 + abs(reference)):
+        if not checked.violations and problem.sign * (reference - value) > _MIN_IMPROVEMENT * (1 + abs(reference)):
             return BetterDesign(Table(parameters), value, order)
     return None
 
 
-def _downhill_points(program: LocalProgram, found: Conditions, both: bool) -> Iterator[Array]:
+def _downhill_points(program: LocalProgram, conditions: Conditions, both: bool) -> Iterator[Array]:
     """Points along the direction of descent, the farthest first."""
     jacobian = program.evaluate(program.x)[2]
     signed = np.array([row.signed for row in program.rows])
-    direction = found.downhill / np.abs(found.downhill / program.sizes).max()
+    direction = conditions.downhill / np.abs(conditions.downhill / program.sizes).max()
     for k in range(_STEPS):
         for side in (1.0, -1.0) if both else (1.0,):
-            step = _FIRST / _RATIO**k * side * direction
+            step = _LONGEST_STEP / _STEP_RATIO**k * side * direction
             target = np.where(signed, np.maximum(jacobian @ step, 0.0), 0.0)
             x = _restore_rows(program, program.x + step, target)
             if x is not None:
@@ -78,5 +78,5 @@ def _restore_rows(program: LocalProgram, x: Array, target: Array) -> Array | Non
         x = x + step
         if np.abs(step / program.sizes).max() <= 1e-15:
             break
-    near = np.abs((x - start) / program.sizes).max() <= 2 * _FIRST
+    near = np.abs((x - start) / program.sizes).max() <= 2 * _LONGEST_STEP
     return x if near and np.all(np.isfinite(x)) else None

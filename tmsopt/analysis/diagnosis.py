@@ -19,7 +19,7 @@ from tmsopt.roots.jordan import Jordan, is_regular, jordan
 from tmsopt.search.solve import solve_if_needed
 
 _RANK = 1e-7  # relative singular value that counts as 0
-_TIMES = 10.0  # or this times √distance: near a semisimple root a singular value is the root of the distance
+_DISTANCE_FACTOR = 10.0  # or this times √distance: near a semisimple root a singular value is the root of the distance
 
 
 @dataclass(frozen=True, repr=False)
@@ -97,12 +97,12 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
     problem = solution.problem.posed
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
     values, ideal = problem.values(parameters), solution.of_polynomial
-    found = values["structure"]
-    assert isinstance(found, Structure)
-    if found.name != ideal.name:  # the stored doubles are slightly off, so that they satisfy a limit
+    ideal_at_design = values["structure"]
+    assert isinstance(ideal_at_design, Structure)
+    if ideal_at_design.name != ideal.name:  # the stored doubles are slightly off, so that they satisfy a limit
         z = np.array([complex(r.re, r.im) for r in ideal.roots for _ in range(r.multiplicity)])
-        found = replace(ideal, distance=float(backward_error([float(c) for c in values.coefficients], z)))
-    return diagnose_roots(problem.model, problem.parameter_set, parameters, found, problem.free)
+        ideal_at_design = replace(ideal, distance=float(backward_error([float(c) for c in values.coefficients], z)))
+    return diagnose_roots(problem.model, problem.parameter_set, parameters, ideal_at_design, problem.free)
 
 
 def diagnose_roots(
@@ -117,14 +117,14 @@ def diagnose_roots(
     Args:
         free: ranges of free parameters; a value that is tiny compared with its range may stand for 0.
     """
-    widths, found = {n: b - a for n, (a, b) in (free or {}).items()}, []
+    widths, diagnoses = {n: b - a for n, (a, b) in (free or {}).items()}, []
 
     def find_chains(point: RootPoint) -> Jordan | None:
         """Jordan structure by the ranks of the matrices; None without matrices, or if they are singular for every s."""
         if model.pencil is None:
             return None
         matrices = evaluate_pencil(model, parameter_set, point.values)
-        threshold = max(_RANK, _TIMES * math.sqrt(structure.distance))
+        threshold = max(_RANK, _DISTANCE_FACTOR * math.sqrt(structure.distance))
         if not is_regular(matrices, point.s, threshold):
             return None
         return jordan(matrices, point.s, point.multiplicity, threshold)
@@ -145,8 +145,8 @@ def diagnose_roots(
             s = midpoint(point.s)
             omega = (complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, k)]))
             distance = structure.distance
-            found.append(Diagnosis(s.real, s.imag, k, g, partial, kind, verdict, distance, ordered, *omega))
-    return tuple(found)
+            diagnoses.append(Diagnosis(s.real, s.imag, k, g, partial, kind, verdict, distance, ordered, *omega))
+    return tuple(diagnoses)
 
 
 def _sensitivity(answer: Response) -> tuple[float, float]:

@@ -62,8 +62,8 @@ class Explanation(Tabular):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        found = plain(self, "summary optimality levers rounding worst precision warnings")
-        return found | {"worst": self.worst or None}
+        data = plain(self, "summary optimality levers rounding worst precision warnings")
+        return data | {"worst": self.worst or None}
 
 
 def explain(design: Given, *, resolve: bool = True, progress: Listener | None = None) -> Explanation:

@@ -23,7 +23,7 @@ from tmsopt.search.solve import solve_any_status
 DIFFERS = 0.2
 """Relative difference between predicted and resolved gain above which the reason is reported."""
 
-_RETRY = 8  # starts of the second search, if the first from the optimum alone gives another gain
+_RETRY_STARTS = 8  # starts of the second search, if the first from the optimum alone gives another gain
 _NOISE = 1e-8  # difference, relative to the objective, that is not significant
 
 
@@ -98,20 +98,26 @@ def find_levers(solution: Solution, resolve: bool = True, progress: Counts | Non
     """One lever for each active limit of an optimum, the most valuable step first."""
     if solution.status != "optimal":
         return ()
-    found = [_first_order_lever(solution, name) for name in solution.active]
-    sample = resolve and (len(found) == 1 or _has_remote_optimum(solution, found))
-    for k, lever in enumerate(found):
-        found[k] = _resolve_lever(solution, lever, sample) if resolve and lever.step else lever
+    levers = [_first_order_lever(solution, name) for name in solution.active]
+    sample = resolve and (len(levers) == 1 or _has_remote_optimum(solution, levers))
+    for k, lever in enumerate(levers):
+        levers[k] = _resolve_lever(solution, lever, sample) if resolve and lever.step else lever
         if progress:
-            progress(k + 1, len(found))
-    return tuple(sorted(found, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
+            progress(k + 1, len(levers))
+    return tuple(sorted(levers, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
+
+
+def split_bound(problem: Posed, bound: str) -> tuple[str, bool, float]:
+    """The parameter of a bound such as ``mu.min``, whether it is the upper bound, and its value."""
+    name, end = bound.rsplit(".", 1)
+    return name, end == "max", problem.free[name][end == "max"]
 
 
 def is_physical(problem: Posed, bound: str) -> bool:
     """Whether a bound such as ``mu.min`` is a physical end of its parameter's range."""
-    name, end = bound.rsplit(".", 1)
+    name, is_upper, value = split_bound(problem, bound)
     allowed = problem.parameter_set[name].range
-    return problem.free[name][end == "max"] == (allowed.upper if end == "max" else allowed.lower)
+    return value == (allowed.upper if is_upper else allowed.lower)
 
 
 def move_limit(problem: Posed, name: str, step: float) -> Posed:
@@ -136,24 +142,24 @@ def _first_order_lever(solution: Solution, name: str) -> Lever:
     problem = solution.problem.posed
     gained, multiplier = common_unit(problem, problem.goal) if problem.goal else Unit(), solution.active[name]
     if name in problem.constraints:
-        condition, shown = problem.conditions[name], limit_text(problem, name)
+        condition, limit_shown = problem.conditions[name], limit_text(problem, name)
         sides = [abs(float(side)) for side in condition.sides(problem.values(solution.parameters))]
         size = max(filter(math.isfinite, sides), default=1.0)  # equal within rounding
         natural = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, size)
-        sign, words = condition.sign, f"relaxing {name} ({shown}) by {natural.text}"
+        sign, words = condition.sign, f"relaxing {name} ({limit_shown}) by {natural.text}"
         if condition.equality:  # the right-hand side moves in the direction that improves the objective
             sign = math.copysign(1.0, -problem.sign * multiplier)
-            words = f"moving {name} ({shown}) by {'' if sign > 0 else '-'}{natural.text}"
-        return Lever(name, "constraint", shown, False, words, sign * natural.size, abs(multiplier), gained=gained)
-    parameter, end = problem.parameter_set[name.rsplit(".", 1)[0]], name.endswith(".max")
-    limit, width = problem.free[parameter.name][end], float(np.ptp(problem.free[parameter.name]))
+            words = f"moving {name} ({limit_shown}) by {'' if sign > 0 else '-'}{natural.text}"
+        return Lever(name, "constraint", limit_shown, False, words, sign * natural.size, abs(multiplier), gained=gained)
+    parameter_name, is_upper, limit = split_bound(problem, name)
+    parameter, width = problem.parameter_set[parameter_name], float(np.ptp(problem.free[parameter_name]))
     # the size of an angle is the width of its range, because 0 is a tilt like any other
     size = width if parameter.unit == "rad" or not limit else min(abs(limit), width)
-    unit, direction = unit_of(problem, parameter.name), 1.0 if end else -1.0
+    unit, direction = unit_of(problem, parameter_name), 1.0 if is_upper else -1.0
     step = step_within(unit, parameter.unit, size, limit, direction, parameter.range)
-    words = f"{'raising' if end else 'lowering'} {name} by {step.text}" if step else ""
-    change, shown = direction * step.size if step else 0.0, unit.show(limit, 10)
-    return Lever(name, "bound", shown, is_physical(problem, name), words, change, abs(multiplier), gained=gained)
+    words = f"{'raising' if is_upper else 'lowering'} {name} by {step.text}" if step else ""
+    change, limit_shown = direction * step.size if step else 0.0, unit.show(limit, 10)
+    return Lever(name, "bound", limit_shown, is_physical(problem, name), words, change, abs(multiplier), gained=gained)
 
 
 def _solve_moved(solution: Solution, problem: Posed, starts: int, sample: bool) -> Solution:
@@ -162,10 +168,10 @@ def _solve_moved(solution: Solution, problem: Posed, starts: int, sample: bool) 
     return solve_any_status(problem, options, without_sample=not sample, bound=False)
 
 
-def _has_remote_optimum(solution: Solution, found: Sequence[Lever]) -> bool:
+def _has_remote_optimum(solution: Solution, levers: Sequence[Lever]) -> bool:
     """Whether moving all limits at once makes a design elsewhere better than the one that the optimum leads to."""
     problem = solution.problem.posed
-    for lever in found:
+    for lever in levers:
         with suppress(InputError):
             problem = move_limit(problem, lever.name, lever.step)
     near, whole = (_solve_moved(solution, problem, 1, sample) for sample in (False, True))
@@ -179,28 +185,28 @@ def _resolve_lever(solution: Solution, lever: Lever, sample: bool) -> Lever:
     except InputError:
         return replace(lever, reason="the problem with this limit moved is not valid")
     best = None
-    for starts in (1, _RETRY):
-        found = _solve_moved(solution, problem, starts, sample or starts > 1)
-        if found.status == "optimal" and not (best and problem.sign * (found.value - best.value) >= 0):
-            best = found
+    for starts in (1, _RETRY_STARTS):
+        new_solution = _solve_moved(solution, problem, starts, sample or starts > 1)
+        if new_solution.status == "optimal" and not (best and problem.sign * (new_solution.value - best.value) >= 0):
+            best = new_solution
             gain = -problem.sign * (best.value - solution.value)
             lever = replace(lever, resolved=gain, structure=best.structure)
             if abs(lever.relative) <= DIFFERS:
                 return lever
     if best is None:
-        return replace(lever, reason=f"the problem with this limit moved is {found.status.replace('_', ' ')}")
+        return replace(lever, reason=f"the problem with this limit moved is {new_solution.status.replace('_', ' ')}")
     return replace(lever, reason=", ".join(_explain_difference(solution, best)))
 
 
-def _explain_difference(solution: Solution, found: Solution) -> Iterator[str]:
+def _explain_difference(solution: Solution, new_solution: Solution) -> Iterator[str]:
     """Reasons why the gain differs from the prediction of the multiplier."""
-    if found.structure != solution.structure:
-        yield f"the structure changes from {solution.structure} to {found.structure}"
-    for words, names, others in (
-        ("no longer active", solution.active, found.active),
-        ("newly active", found.active, solution.active),
+    if new_solution.structure != solution.structure:
+        yield f"the structure changes from {solution.structure} to {new_solution.structure}"
+    for words, names, other_names in (
+        ("no longer active", solution.active, new_solution.active),
+        ("newly active", new_solution.active, solution.active),
     ):
-        if changed := [n for n in names if n not in others]:
+        if changed := [n for n in names if n not in other_names]:
             yield f"{words}: {' and '.join(changed)}"
-    if found.structure == solution.structure and set(found.active) == set(solution.active):
-        yield f"the gain is not linear over this step ({found.structure} before and after)"
+    if new_solution.structure == solution.structure and set(new_solution.active) == set(solution.active):
+        yield f"the gain is not linear over this step ({new_solution.structure} before and after)"

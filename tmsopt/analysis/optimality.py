@@ -65,8 +65,8 @@ class RightmostRoot:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        found = plain(self, "re im multiplicity share beta kappa ties")
-        return found | (plain(self, "eigenfrequency") if self.eigenfrequency is not None else {})
+        data = plain(self, "re im multiplicity share beta kappa ties")
+        return data | (plain(self, "eigenfrequency") if self.eigenfrequency is not None else {})
 
 
 @dataclass(frozen=True, repr=False)
@@ -115,8 +115,8 @@ class Optimality(Printable):
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
         if self.verdict == NOT_COVERED:
             return plain(self, "verdict reason")
-        found = plain(self)
-        return found if self.better else {n: x for n, x in found.items() if n not in ("better", "better_value")}
+        data = plain(self)
+        return data if self.better else {n: x for n, x in data.items() if n not in ("better", "better_value")}
 
 
 def optimality(design: Given, *, progress: Listener | None = None) -> Optimality:
@@ -141,25 +141,25 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
         program = build_program(problem, solution)
     except NotCovered as error:
         return Optimality(NOT_COVERED, str(error))
-    found = evaluate_conditions(program)
-    weight = sum(y for y, h in zip(found.scaled, program.rows, strict=True) if h.name == "c1")
-    if not found.downhill.any() and not weight > POSITIVE:
+    conditions = evaluate_conditions(program)
+    weight = sum(y for y, h in zip(conditions.scaled, program.rows, strict=True) if h.name == "c1")
+    if not conditions.downhill.any() and not weight > POSITIVE:
         return Optimality(NOT_COVERED, "the objective does not decrease with the abscissa")
-    better = find_better_design(program, found, solution) if found.downhill.any() else None
-    verdict, order, reason = _verdict(solution, program, found, better)
-    stationary = found.residual <= STATIONARY
+    better = find_better_design(program, conditions, solution) if conditions.downhill.any() else None
+    verdict, order, reason = _verdict(solution, program, conditions, better)
+    stationary = conditions.residual <= STATIONARY
     unknowns, count = _count_unknowns(program)
     return Optimality(
         verdict=verdict,
         reason=reason,
         order=order,
         goal=problem.goal,
-        roots=_rightmost_roots(program, found) if stationary else (),
-        limits=Table(_limit_gains(solution, program, found) if stationary else {}),
+        roots=_rightmost_roots(program, conditions) if stationary else (),
+        limits=Table(_limit_gains(solution, program, conditions) if stationary else {}),
         unknowns=unknowns,
         conditions=count,
-        residual=found.residual,
-        curvature=found.curvature,
+        residual=conditions.residual,
+        curvature=conditions.curvature,
         idle=program.idle,
         better=better.parameters if better else Table(),
         better_value=better.value if better else math.nan,
@@ -204,46 +204,48 @@ def _problem_to_judge(solution: Solution) -> Posed:
 
 
 def _verdict(
-    solution: Solution, program: LocalProgram, found: Conditions, better: BetterDesign | None
+    solution: Solution, program: LocalProgram, conditions: Conditions, better: BetterDesign | None
 ) -> tuple[str, int, str]:
     """Verdict, order of the derivatives that decide it, and the sentence."""
     problem, name = program.problem, f"this {solution.structure} is"
     extreme = f"local {'maximum' if problem.sense == 'maximize' else 'minimum'} of {problem.goal}"
     extreme += ", though this was not asked for" if solution.problem.locate else ""
     if better is not None:
-        reason = f"{_describe_descent(program, found)}; {_describe_better_design(solution, better)}"
+        reason = f"{_describe_descent(program, conditions)}; {_describe_better_design(solution, better)}"
         return NOT_MINIMAL, better.order, f"{name} no {extreme}: {reason}"
-    if doubt := _find_doubt(program, found):
+    if doubt := _find_doubt(program, conditions):
         return UNDECIDED, 0, f"undecided whether {name} a {extreme}: {doubt}"
     unknowns, count = _count_unknowns(program)
     active = f"{count} active condition{'s leave' if count != 1 else ' leaves'}"
     idle = f"; without effect: {', '.join(program.idle)}" if program.idle else ""
-    if np.isnan(found.curvature):
+    if np.isnan(conditions.curvature):
         return STRICT, 1, f"{name} a strict {extreme}: {active} none of the {unknowns} unknowns free{idle}"
     bend = "downwards" if solution.problem.posed.sense == "maximize" else "upwards"
     free = f"{active} some of the {unknowns} unknowns free"
     return STRICT, 2, f"{name} a strict {extreme}: {free}, and the objective curves {bend} in the free directions{idle}"
 
 
-def _find_doubt(program: LocalProgram, found: Conditions) -> str:
+def _find_doubt(program: LocalProgram, conditions: Conditions) -> str:
     """Why the conditions do not decide although no better design was found; empty where they decide."""
-    if found.residual > STATIONARY or (found.downhill.any() and np.isnan(found.curvature)):
-        return f"{_describe_residual(found)}, but no better design was found downhill"
-    left, sizes = np.abs(program.evaluate(program.x)[1]), np.array([h.size for h in program.rows])
-    off = float(np.divide(left, sizes, out=np.zeros_like(left), where=sizes > 0).max(initial=0.0))
-    if off > _TOLERANCE:
-        return f"the active conditions hold only to {off:.1g}"
-    loose = [h for h, firm in zip(program.rows, found.firm, strict=True) if h.name == "c2" and not firm]
+    if conditions.residual > STATIONARY or (conditions.downhill.any() and np.isnan(conditions.curvature)):
+        return f"{_describe_residual(conditions)}, but no better design was found downhill"
+    deviations, sizes = np.abs(program.evaluate(program.x)[1]), np.array([h.size for h in program.rows])
+    worst_deviation = float(
+        np.divide(deviations, sizes, out=np.zeros_like(deviations), where=sizes > 0).max(initial=0.0)
+    )
+    if worst_deviation > _TOLERANCE:
+        return f"the active conditions hold only to {worst_deviation:.1g}"
+    loose = [h for h, firm in zip(program.rows, conditions.firm, strict=True) if h.name == "c2" and not firm]
     if any(program.line[h.cluster].multiplicity > 3 for h in loose):
         return "no first-order condition keeps a multiple root together"  # c₄ ≤ c₂² may then outweigh c₂
-    if curvature_sign(found.curvature) <= 0 and not np.isnan(found.curvature):
-        change = "improves" if curvature_sign(found.curvature) else "is flat"
+    if curvature_sign(conditions.curvature) <= 0 and not np.isnan(conditions.curvature):
+        change = "improves" if curvature_sign(conditions.curvature) else "is flat"
         return f"along the free directions the objective {change} to second order"
     return ""
 
 
-def _describe_residual(found: Conditions) -> str:
-    return f"the active conditions do not balance {found.residual:.1g} of the gradient"
+def _describe_residual(conditions: Conditions) -> str:
+    return f"the active conditions do not balance {conditions.residual:.1g} of the gradient"
 
 
 def _count_unknowns(program: LocalProgram) -> tuple[int, int]:
@@ -252,14 +254,14 @@ def _count_unknowns(program: LocalProgram) -> tuple[int, int]:
     return unknowns, len(program.rows) - (len(program.x) - unknowns)
 
 
-def _describe_descent(program: LocalProgram, found: Conditions) -> str:
+def _describe_descent(program: LocalProgram, conditions: Conditions) -> str:
     """How the objective improves, to first order or by its curvature."""
-    if curvature_sign(found.curvature) < 0:
+    if curvature_sign(conditions.curvature) < 0:
         return "it is stationary, but second derivatives let it improve along the active conditions"
-    if not found.independent or found.residual > STATIONARY:
-        return _describe_residual(found)
+    if not conditions.independent or conditions.residual > STATIONARY:
+        return _describe_residual(conditions)
     ways = {"c1": "roots move left of the others", "c2": "a multiple root splits"}
-    scaled = zip(program.rows, found.scaled, strict=True)
+    scaled = zip(program.rows, conditions.scaled, strict=True)
     listed = [ways.get(h.name, f"the design moves away from {h.name}") for h, y in scaled if h.signed and y < -POSITIVE]
     return f"it improves if {' and if '.join(dict.fromkeys(listed))}"
 
@@ -271,28 +273,28 @@ def _describe_better_design(solution: Solution, better: BetterDesign) -> str:
     return f"{', '.join(parts)} gives {better.value:.6g}"
 
 
-def _rightmost_roots(program: LocalProgram, found: Conditions) -> tuple[RightmostRoot, ...]:
+def _rightmost_roots(program: LocalProgram, conditions: Conditions) -> tuple[RightmostRoot, ...]:
     """The roots on the rightmost line with their multipliers."""
-    listed, rows = [], list(zip(program.rows, found.multipliers.tolist(), strict=True))
+    listed, rows = [], list(zip(program.rows, conditions.multipliers.tolist(), strict=True))
     model = program.problem.model
     total = sum(program.line[h.cluster].multiplicity * y for h, y in rows if h.name == "c1")
     for k, root in enumerate(program.line):
-        own = {h.name: y for h, y in rows if h.cluster == k}
-        first, second = own.pop("c1"), own.pop("c2", math.nan)
+        multipliers = {h.name: y for h, y in rows if h.cluster == k}
+        first, second = multipliers.pop("c1"), multipliers.pop("c2", math.nan)
         share = root.multiplicity * first / total if total else math.nan
         beta = first / 2 if root.im else first  # β moves both roots of a pair by β/2
         # the user's root of a complex system is the conjugate
-        (shown,) = user_roots(model, [root if model.carrier is None else replace(root, im=-root.im)])
-        omega = (complex(w.re, w.im) for w in eigenfrequencies(model, [shown]))
-        ties = tuple(own.values())
-        listed.append(RightmostRoot(shown.re, shown.im, root.multiplicity, share, beta, second, ties, *omega))
+        (user_root,) = user_roots(model, [root if model.carrier is None else replace(root, im=-root.im)])
+        omega = (complex(w.re, w.im) for w in eigenfrequencies(model, [user_root]))
+        ties = tuple(multipliers.values())
+        listed.append(RightmostRoot(user_root.re, user_root.im, root.multiplicity, share, beta, second, ties, *omega))
     return tuple(listed)
 
 
-def _limit_gains(solution: Solution, program: LocalProgram, found: Conditions) -> Mapping[str, float]:
+def _limit_gains(solution: Solution, program: LocalProgram, conditions: Conditions) -> Mapping[str, float]:
     """Gain of the objective per unit of relaxation; for an equality, change per unit added to the right-hand side."""
     problem, limits = program.problem, dict[str, float]()
-    for h, y, firm in zip(program.rows, found.multipliers.tolist(), found.firm, strict=True):
+    for h, y, firm in zip(program.rows, conditions.multipliers.tolist(), conditions.firm, strict=True):
         if h.name in problem.constraints:
             limits[h.name] = y if h.signed else problem.sign * y
         elif h.signed and h.cluster < 0 and firm and (name := h.name.rsplit(".", 1)[0]) in problem.free:

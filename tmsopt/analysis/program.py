@@ -32,9 +32,9 @@ from tmsopt.program.nlp import NLP
 from tmsopt.records import Array
 from tmsopt.roots import Root, product, shift
 
-_ACTIVE = 2e-9  # largest slack of an active constraint, relative to 1 + |limit|: twice the tolerance of feasibility
-_AT = 1e-12  # largest distance of an active bound, relative to its size and the width of its range
-_LINE = 1e-6  # relative difference of real parts on one vertical line, for roots of an exact structure
+_MAX_SLACK = 2e-9  # largest slack of an active constraint, relative to 1 + |limit|: twice the tolerance of feasibility
+_BOUND_DISTANCE = 1e-12  # largest distance of an active bound, relative to its size and the width of its range
+_SAME_LINE = 1e-6  # relative difference of real parts on one vertical line, for roots of an exact structure
 _ROOT_ROWS = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY)  # rows of factors, which this program replaces
 
 
@@ -85,8 +85,8 @@ class LocalProgram:
 
     def evaluate(self, x: Array, y: Array | None = None) -> tuple[Array, Array, Array, Array]:
         """∇f, h, ∂h/∂x, and the Hessian of f − y·h."""
-        found = self.functions(x, np.zeros(len(self.rows)) if y is None else y)
-        gradient, h, jacobian, hessian = (part.full() for part in found)
+        outputs = self.functions(x, np.zeros(len(self.rows)) if y is None else y)
+        gradient, h, jacobian, hessian = (part.full() for part in outputs)
         return gradient.ravel(), h.ravel(), jacobian, hessian
 
 
@@ -103,16 +103,16 @@ def build_program(problem: Posed, solution: Solution) -> LocalProgram:
     for n in nlp.variables[len(free) :]:  # nan for the coefficients of factors, which are not used here
         at[n] = float(values[n]) / units.get(n, 1.0) if n in values else np.nan
     x = {n: ca.SX.sym(n) for n in at}
-    every = ca.vertcat(*x.values())
-    f, g = nlp.symbolic(every)
+    all_variables = ca.vertcat(*x.values())
+    f, g = nlp.symbolic(all_variables)
     reached = nlp.evaluate(np.nan_to_num([*at.values()], posinf=0.0, neginf=0.0))[1]
     tied = {n: _defining_rows(nlp, n) for n in x if n in nlp.rows and n not in _ROOT_ROWS}
     # a maximum whose constant argument is the largest one here
-    steady = [n for n, rows in tied.items() if all(nlp.row_upper[k] > 0 and reached[k] > _ACTIVE for k in rows)]
+    steady = [n for n, rows in tied.items() if all(nlp.row_upper[k] > 0 and reached[k] > _MAX_SLACK for k in rows)]
     f, g = ca.substitute([f, g], [x[n] for n in steady], [ca.SX(at[n]) for n in steady])
     build = _Builder()
     for k, name in enumerate(nlp.rows):
-        if name in problem.constraints and ca.depends_on(g[k], every):
+        if name in problem.constraints and ca.depends_on(g[k], all_variables):
             build.add_nlp_row(nlp, k, g, reached)
     needed = [n for n in x if n == "abscissa"]
     for _ in nlp.lifts:
@@ -127,7 +127,7 @@ def build_program(problem: Posed, solution: Solution) -> LocalProgram:
         raise NotCovered("the abscissa is not active, so this optimum does not depend on the roots")
     roots = solution.of_polynomial.roots
     size = max(float(np.hypot(r.re, r.im)) for r in roots)
-    near = 0.0 if solution.of_polynomial.name in ("pair", "real") else _LINE * size
+    near = 0.0 if solution.of_polynomial.name in ("pair", "real") else _SAME_LINE * size
     right = [r for r in roots if r.re >= solution.abscissa - near]
     line = tuple(r for r in right if r.im >= 0)
     design = {n: ca.atan(x[n]) if problem.parameter_set[n].tangent else x[n] for n in free}
@@ -138,14 +138,14 @@ def build_program(problem: Posed, solution: Solution) -> LocalProgram:
     idle = tuple(n for n in free if not ca.depends_on(binding, x[n]))
     variables = []
     for n in (n for n in x if (n in free and n not in idle) or n in needed):
-        own = size / nlp.unit if n == "abscissa" else max(abs(at[n]), 1e-3)
+        natural_size = size / nlp.unit if n == "abscissa" else max(abs(at[n]), 1e-3)
         if n in free:
             low, high = (float(np.tan(e)) if problem.parameter_set[n].tangent else e for e in free[n])
-            own = max(abs(at[n]), min(high - low, 1.0), 1e-12)  # a range wider than 1 is no measure of size
+            natural_size = max(abs(at[n]), min(high - low, 1.0), 1e-12)  # a range wider than 1 is no measure of size
             for end, limit, side in zip(("min", "max"), free[n], (1, -1), strict=True):
-                if abs(solution.parameters[n] - limit) <= _AT * (abs(limit) + np.ptp(free[n])):
+                if abs(solution.parameters[n] - limit) <= _BOUND_DISTANCE * (abs(limit) + np.ptp(free[n])):
                     build.add_row(ActiveRow(f"{n}.{end}", True), side * (x[n] - at[n]))
-        variables.append((n, x[n], at[n], own))
+        variables.append((n, x[n], at[n], natural_size))
     names, symbols, point, sizes = zip(*variables, *build.unknowns, strict=True)
     z, h = ca.vertcat(*symbols), ca.vertcat(*build.expressions)
     y = ca.SX.sym("y", h.numel())
@@ -184,7 +184,7 @@ class _Builder:
         """Add a row of the NLP if it is an equality or active."""
         name, lower, upper = nlp.rows[k], nlp.row_lower[k], nlp.row_upper[k]
         for end, side in ((lower, 1), (upper, -1)):
-            if np.isfinite(end) and (lower == upper or abs(reached[k] - end) <= _ACTIVE * (1 + abs(end))):
+            if np.isfinite(end) and (lower == upper or abs(reached[k] - end) <= _MAX_SLACK * (1 + abs(end))):
                 self.add_row(ActiveRow(name, lower != upper), side * (g[k] - end))
                 return
 
@@ -193,7 +193,7 @@ class _Builder:
         return self.unknowns[-1][1]
 
     def add_factors(
-        self, a: Sequence[Any], lead: float, size: float, gamma: Any, line: Sequence[Root], others: Sequence[Root]
+        self, a: Sequence[Any], lead: float, size: float, gamma: Any, line: Sequence[Root], other_roots: Sequence[Root]
     ) -> None:
         """Add p(t + γ) = a0 · ∏ q · r; the given roots fix the values of the unknowns. `lead` is |a0|."""
         factors = []
@@ -215,8 +215,8 @@ class _Builder:
                 im[-1] += add_coefficient(f"im c{k}", k, False) if root.im and k > 1 else 0
             pair = [x + y for x, y in zip(product(re, re), product(im, im), strict=True)]
             factors.append(pair if root.im else re)
-        rest = [complex(r.re, r.im) - line[0].re for r in others for _ in range(r.multiplicity)]
-        monic = np.atleast_1d(np.poly(rest)).real.tolist()
+        left_roots = [complex(r.re, r.im) - line[0].re for r in other_roots for _ in range(r.multiplicity)]
+        monic = np.atleast_1d(np.poly(left_roots)).real.tolist()
         factors.append([1, *(self.add_unknown(f"r{k}", monic[k], size**k) for k in range(1, len(monic)))])
         shifted, multiplied = shift(a, gamma), product(*factors)
         for k in range(1, len(shifted)):

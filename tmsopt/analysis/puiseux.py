@@ -9,7 +9,9 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-_SAME = 1e-9  # relative difference of coefficients up to which an edge counts as the power of a linear polynomial
+_SAME_COEFFICIENT = (
+    1e-9  # relative difference of coefficients up to which an edge counts as the power of a linear polynomial
+)
 
 
 @dataclass(frozen=True)
@@ -38,11 +40,11 @@ class Branches:
 
     def shifts(self, eps: float) -> list[complex]:
         """All t for a real ε, to leading order."""
-        found: list[complex] = []
+        shifts: list[complex] = []
         for constant in self.constants:
             first = (complex(constant) * eps**self.numerator) ** (1 / self.denominator)
-            found += [first * np.exp(2j * np.pi * k / self.denominator) for k in range(self.denominator)]
-        return found
+            shifts += [first * np.exp(2j * np.pi * k / self.denominator) for k in range(self.denominator)]
+        return shifts
 
 
 def find_branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, ...], int]:
@@ -59,13 +61,13 @@ def find_branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, .
         while len(hull) > 1 and _slope(hull[-2], hull[-1]) >= _slope(hull[-2], (j, m)):
             hull.pop()
         hull.append((j, m))
-    found = []
+    branches = []
     for (j1, m1), (j2, m2) in pairwise(hull):
         width, drop = j2 - j1, m1 - m2
         q = width // gcd(width, drop)
         polynomial = [complex(terms[m1 - i * q * drop // width][j1 + i * q]) for i in reversed(range(width // q + 1))]
-        found.append(Branches(width, drop * q // width, q, _roots(np.array(polynomial))))
-    return tuple(sorted(found, key=lambda b: b.exponent)), hull[0][0] if hull else k
+        branches.append(Branches(width, drop * q // width, q, _roots(np.array(polynomial))))
+    return tuple(sorted(branches, key=lambda b: b.exponent)), hull[0][0] if hull else k
 
 
 def _roots(polynomial: NDArray[np.complex128]) -> tuple[complex, ...]:
@@ -74,7 +76,7 @@ def _roots(polynomial: NDArray[np.complex128]) -> tuple[complex, ...]:
     mean = -polynomial[1] / (k * polynomial[0])
     power = polynomial[0] * np.poly(np.full(k, mean))
     terms = np.abs(polynomial[0]) * np.poly(np.full(k, -np.abs(mean)))
-    if np.all(np.abs(power - polynomial) <= _SAME * terms):
+    if np.all(np.abs(power - polynomial) <= _SAME_COEFFICIENT * terms):
         return (complex(mean),) * k
     return tuple(complex(z) for z in np.roots(polynomial))
 

@@ -15,19 +15,19 @@ from tmsopt.records import Numbers
 from tmsopt.roots.polynomial import characteristic_polynomial
 
 _BITS = 424  # 127 digits: changes down to 1e-16 are differences of coefficients
-_CAP = 64  # orders of a power series; FLINT keeps 10 by default
+_MAX_ORDERS = 64  # orders of a power series; FLINT keeps 10 by default
 _ROUNDING = 2.0**-50  # relative rounding of a parameter: a double after a few operations
-_NEAR = 1e-3  # share of a range below which a parameter may stand for 0, and its size is the width of the range
+_NEAR_ZERO = 1e-3  # share of a range below which a parameter may stand for 0, and its size is the width of the range
 _ZERO = 1e-12  # share of a size below which a parameter changes absolutely, not relatively
-_FARTHEST = 0.01  # largest move of a parameter relative to its size; farther points are other points
-_SLOW = 0.9  # ratio of successive residuals above which the iteration ends
+_MAX_MOVE = 0.01  # largest move of a parameter relative to its size; farther points are other points
+_MAX_RATIO = 0.9  # ratio of successive residuals above which the iteration ends
 _RANKS = (
     1e-3,
     1e-7,
     1e-12,
 )  # relative singular values below which directions are dropped; the best of the three counts
 _CONVERGED = 2.0**-200  # relative residual of conditions that hold to all digits
-_LAST = 4  # error relative to the last step; with singular conditions that step is as long as the error
+_STEP_ERROR = 4  # error relative to the last step; with singular conditions that step is as long as the error
 
 Polynomial = Callable[[Mapping[str, Any]], list[Any]]
 """Values of parameters (balls or series) → coefficients, descending."""
@@ -93,14 +93,14 @@ class RootPoint:
         if doubt:
             wide = flint.arb(0, self.unit * self.width)
             s = s + (flint.acb(wide) if self.real else flint.acb(wide, wide))
-        found = flint.acb_poly(list(coefficients[::-1]))(flint.acb_poly([s, self.unit * flint.arb(scale)]))
-        return [found[j] for j in range(len(coefficients))]
+        expansion = flint.acb_poly(list(coefficients[::-1]))(flint.acb_poly([s, self.unit * flint.arb(scale)]))
+        return [expansion[j] for j in range(len(coefficients))]
 
 
 @contextmanager
 def high_precision() -> Iterator[None]:
     """The precision of a diagnosis, and all orders of power series."""
-    cap, flint.ctx.cap = flint.ctx.cap, _CAP
+    cap, flint.ctx.cap = flint.ctx.cap, _MAX_ORDERS
     try:
         with flint.ctx.workprec(_BITS):
             yield
@@ -114,10 +114,12 @@ def evaluate_pencil(model: Model, parameter_set: ParameterSet, values: Mapping[s
     if model.double is None:
         assert model.pencil is not None
         return model.pencil(native)
-    one, found = model.double(native)  # real form: I and −[[J, R], [−R, J]]
-    n = len(found) // 2
-    both = [[_to_complex(row[j]) - flint.acb(0, 1) * _to_complex(row[n + j]) for j in range(n)] for row in found[:n]]
-    return [row[:n] for row in one[:n]], both
+    identity, real_form = model.double(native)  # real form: I and −[[J, R], [−R, J]]
+    n = len(real_form) // 2
+    both = [
+        [_to_complex(row[j]) - flint.acb(0, 1) * _to_complex(row[n + j]) for j in range(n)] for row in real_form[:n]
+    ]
+    return [row[:n] for row in identity[:n]], both
 
 
 def refine_root(
@@ -129,7 +131,7 @@ def refine_root(
     multiplicity: int,
 ) -> RootPoint:
     """A multiple root of the stored parameters: the zero of the derivative of order multiplicity − 1."""
-    sizes = {n: width if abs(x) <= _NEAR * (width := widths.get(n, 0.0)) else abs(x) for n, x in design.items()}
+    sizes = {n: width if abs(x) <= _NEAR_ZERO * (width := widths.get(n, 0.0)) else abs(x) for n, x in design.items()}
     values = {n: flint.arb(exact(x)) for n, x in design.items()}
     doubt = {n: _ROUNDING * x for n, x in sizes.items()}
     real = model.double is None and s.imag == 0
@@ -141,76 +143,78 @@ def refine_root(
         _, negative = evaluate_pencil(model, parameter_set, values)
         return characteristic_polynomial([[-x for x in row] for row in negative])
 
-    found = RootPoint(polynomial, values, doubt, sizes, widths, flint.acb(s), multiplicity, real)
-    return _improve(replace(found, unit=max(_root_bound(found), abs(s)) or 1.0))
+    point = RootPoint(polynomial, values, doubt, sizes, widths, flint.acb(s), multiplicity, real)
+    return _improve(replace(point, unit=max(_root_bound(point), abs(s)) or 1.0))
 
 
-def refine_point(found: RootPoint, geometric: int) -> RootPoint:
+def refine_point(point: RootPoint, geometric: int) -> RootPoint:
     """The nearest point at which the root is multiple, by Gauss-Newton steps in parameters and root.
 
     The conditions: p and its derivatives below the multiplicity are 0 at the root. With g independent eigenvectors, all
     derivatives of p in s and a parameter of order below g are 0 as well.
     """
-    every = [n for n, size in found.sizes.items() if size > 0]
-    best = _improve(replace(found, geometric=geometric, moving=[n for n in every if n in found.free]))
-    return best if best.off < _CONVERGED else _improve(replace(best, moving=every))
+    names = [n for n, size in point.sizes.items() if size > 0]
+    best = _improve(replace(point, geometric=geometric, moving=[n for n in names if n in point.free]))
+    return best if best.off < _CONVERGED else _improve(replace(best, moving=names))
 
 
 def _improve(start: RootPoint) -> RootPoint:
     """Refine the root, and the moving parameters, until the conditions hold or stop improving."""
     best, lead = start, abs(start.expand()[start.multiplicity]).mid()
-    left = _conditions(best, lead)
-    off = _norm(left)
-    while 2.0 ** (-2 * _BITS // 3) < off < np.inf:
-        tried = []
-        for step in _steps(best, left, lead):
+    residuals = _conditions(best, lead)
+    largest = _norm(residuals)
+    while 2.0 ** (-2 * _BITS // 3) < largest < np.inf:
+        candidates = []
+        for step in _steps(best, residuals, lead):
             point = _apply_step(best, step)
-            if all(abs(point.values[n] - start.values[n]) <= _FARTHEST * start.sizes[n] for n in start.moving):
-                tried.append((_norm(new := _conditions(point, lead)), point, new, step))
-        new_off, point, new, step = min(tried, key=lambda each: each[0], default=(off, best, left, []))
-        if not new_off < _SLOW * off:
+            if all(abs(point.values[n] - start.values[n]) <= _MAX_MOVE * start.sizes[n] for n in start.moving):
+                candidates.append((_norm(new_residuals := _conditions(point, lead)), point, new_residuals, step))
+        new_largest, point, new_residuals, step = min(
+            candidates, key=lambda each: each[0], default=(largest, best, residuals, [])
+        )
+        if not new_largest < _MAX_RATIO * largest:
             break
-        lengths = {n: _LAST * abs(float(x)) for n, x in zip(start.moving, step, strict=False)}
+        lengths = {n: _STEP_ERROR * abs(float(x)) for n, x in zip(start.moving, step, strict=False)}
         doubt = {n: max(_ROUNDING, lengths.get(n, 0.0)) * x for n, x in start.sizes.items()}
-        width = max(_ROUNDING, _LAST * float(abs(step[-1])), float(new_off))
-        best, off, left = replace(point, doubt=doubt, width=width), new_off, new
+        width = max(_ROUNDING, _STEP_ERROR * float(abs(step[-1])), float(new_largest))
+        best, largest, residuals = replace(point, doubt=doubt, width=width), new_largest, new_residuals
     parts, least = (best.s.real, best.s.imag), best.unit * best.width  # parts within rounding of 0 become 0
-    return replace(best, off=float(off), s=flint.acb(*(flint.arb(0) if abs(x) <= least else x for x in parts)))
+    return replace(best, off=float(largest), s=flint.acb(*(flint.arb(0) if abs(x) <= least else x for x in parts)))
 
 
 def _conditions(point: RootPoint, lead: Any) -> list[Any]:
     """Relative residuals; for a root alone, the condition that it is the mean of the roots that nearly meet."""
     k, g = point.multiplicity, point.geometric
-    found = point.expand()[0 if point.moving else k - 1 : k]
+    residuals = point.expand()[0 if point.moving else k - 1 : k]
     for name in point.values if point.moving and g > 1 else ():
         series = point.perturb(name, flint.arb_series([0, point.sizes[name] or 1], prec=g))
         for m in range(1, g):
-            found += point.taylor(coefficients_of_order(series, m))[: g - m]
-    return [x / lead for x in found]
+            residuals += point.taylor(coefficients_of_order(series, m))[: g - m]
+    return [x / lead for x in residuals]
 
 
-def _steps(point: RootPoint, left: Sequence[Any], lead: Any) -> Iterator[list[Any]]:
+def _steps(point: RootPoint, residuals: Sequence[Any], lead: Any) -> Iterator[list[Any]]:
     """Least-squares steps: parameters relative to their sizes, then the root in its unit."""
     small, count = flint.arb(2) ** (-_BITS // 3), len(point.moving)
-    size = max(abs(x) for x in left).mid()
+    size = max(abs(x) for x in residuals).mid()
     columns = []
     for shift in np.eye(count + 1).tolist():
         ahead = _conditions(_apply_step(point, [small * x for x in shift]), lead)
-        columns.append([(a - b) / small for a, b in zip(ahead, left, strict=True)])
+        columns.append([(a - b) / small for a, b in zip(ahead, residuals, strict=True)])
     if not point.real:
         columns.append([flint.acb(0, 1) * x for x in columns[-1]])
     matrix = np.array([[midpoint(x) for x in column] for column in columns]).T
-    right = np.array([midpoint(x / size) for x in left])
+    right = np.array([midpoint(x / size) for x in residuals])
     J, r = (np.concatenate([x.real, x.imag]) for x in (matrix, right))
     for rank in _RANKS if np.isfinite(J).all() else ():  # singular conditions have vanishing slopes
-        found = np.linalg.lstsq(J, -r, rcond=rank)[0]
-        yield [*(size * float(x) for x in found[:count]), size * flint.acb(*found[count:].tolist())]
+        solution = np.linalg.lstsq(J, -r, rcond=rank)[0]
+        yield [*(size * float(x) for x in solution[:count]), size * flint.acb(*solution[count:].tolist())]
 
 
 def _apply_step(point: RootPoint, step: Sequence[Any]) -> RootPoint:
-    moved = {n: (point.values[n] + point.sizes[n] * x).mid() for n, x in zip(point.moving, step, strict=False)}
+    new_values = {n: (point.values[n] + point.sizes[n] * x).mid() for n, x in zip(point.moving, step, strict=False)}
     s = point.s + point.unit * step[-1]
-    return replace(point, values={**point.values, **moved}, s=flint.acb(s.real.mid(), s.imag.mid()))
+    return replace(point, values={**point.values, **new_values}, s=flint.acb(s.real.mid(), s.imag.mid()))
 
 
 def _root_bound(point: RootPoint) -> float:
@@ -220,8 +224,8 @@ def _root_bound(point: RootPoint) -> float:
     return max(filter(np.isfinite, ratios), default=0.0)
 
 
-def _norm(left: Sequence[Any]) -> Any:
-    sizes = [abs(x) for x in left]
+def _norm(residuals: Sequence[Any]) -> Any:
+    sizes = [abs(x) for x in residuals]
     return max((x.mid() for x in sizes), default=flint.arb(0)) if all(x.is_finite() for x in sizes) else np.inf
 
 

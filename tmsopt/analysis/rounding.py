@@ -24,7 +24,7 @@ ALONE = 3
 DIGITS = (2, 3, 4, 6)
 """Significant digits to which all parameters are rounded together."""
 
-_SAME = 1e-15  # relative change that is not rounding, as of a degree or two in radians
+_UNROUNDED = 1e-15  # relative change that is not rounding, as of a degree or two in radians
 _DEGREE = math.pi / 180
 _LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
 _DECIMALS = 140  # decimal digits of the exact numbers
@@ -55,21 +55,21 @@ class RoundedDesign:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        found = plain(self)
-        return {"abscissa_realised" if name == "realised" else name: value for name, value in found.items()}
+        data = plain(self)
+        return {"abscissa_realised" if name == "realised" else name: value for name, value in data.items()}
 
 
 def list_rounded_designs(solution: Solution) -> tuple[Table[RoundedDesign], tuple[RoundedDesign, ...]]:
     """Each free parameter rounded alone, unless it has no more digits, and all together to increasing digits."""
     names = list(solution.problem.free)
     alone = [n for n in names if not _is_short(solution, n)]
-    found = round_design(solution, [*(([n], ALONE) for n in alone), *((names, digits) for digits in DIGITS if names)])
-    return Table(dict(zip(alone, found, strict=False))), found[len(alone) :]
+    designs = round_design(solution, [*(([n], ALONE) for n in alone), *((names, digits) for digits in DIGITS if names)])
+    return Table(dict(zip(alone, designs, strict=False))), designs[len(alone) :]
 
 
 def round_design(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) -> tuple[RoundedDesign, ...]:
     """The design with some parameters rounded, for each choice (names, significant digits)."""
-    problem, found = solution.problem.posed, []
+    problem, rounded_designs = solution.problem.posed, []
     with flint.ctx.workdps(_DECIMALS), np.errstate(all="ignore"):  # undefined values become nan or inf
         for names, digits in choices:
             units = {n: unit_of(problem, n) for n in names}
@@ -87,8 +87,8 @@ def round_design(solution: Solution, choices: Sequence[tuple[Sequence[str], int]
                 objective=float(problem.objective(values)) if problem.objective else math.nan,
                 violations=Table(violated | _range_violations(problem, design)),
             )
-            found.append(row)
-    return tuple(found)
+            rounded_designs.append(row)
+    return tuple(rounded_designs)
 
 
 def _cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
@@ -113,7 +113,7 @@ def _range_violations(problem: Posed, design: Mapping[str, Any]) -> dict[str, fl
 def _is_short(solution: Solution, name: str) -> bool:
     """Whether rounding a parameter alone leaves it unchanged."""
     value, unit = solution.parameters[name], unit_of(solution.problem.posed, name)
-    return abs(float(_format_decimal(solution, name, unit, ALONE)) * unit.one - value) <= _SAME * abs(value)
+    return abs(float(_format_decimal(solution, name, unit, ALONE)) * unit.one - value) <= _UNROUNDED * abs(value)
 
 
 def _format_decimal(solution: Solution, name: str, unit: Unit, digits: int) -> str:

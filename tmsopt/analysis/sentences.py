@@ -15,17 +15,19 @@ _DIGITS = 12
 _NOT_COVERED = {ANGULAR_FREQUENCY: "frequencies", RADIUS: "the robustness radius"}
 
 
-def structure_line(problem: Posed, structure: str, abscissa: float, known: Sequence[MultipleRoot]) -> str:
+def structure_line(problem: Posed, structure: str, abscissa: float, multiple_roots: Sequence[MultipleRoot]) -> str:
     """The structure of the roots, and whether its multiple root is defective where that is not so or unknown.
 
     Args:
-        known: the multiple roots, rightmost first.
+        multiple_roots: the multiple roots, rightmost first.
     """
     words = describe_user_structure(problem.model, structure, abscissa > 0)
-    multiple = known if problem.pattern is not None else [m for m in known if m.re == known[0].re]
+    multiple = (
+        multiple_roots if problem.pattern is not None else [m for m in multiple_roots if m.re == multiple_roots[0].re]
+    )
     if crossing := next((m for m in multiple if not m.exceptional), None):
         return f"{words}: {describe_crossing(crossing)}"
-    if known and problem.model.pencil is None and "EP" in f"{problem.locate or ''}{structure}":
+    if multiple_roots and problem.model.pencil is None and "EP" in f"{problem.locate or ''}{structure}":
         return f"{words}; coefficients cannot tell whether it is defective"
     return words
 
@@ -39,9 +41,9 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
     if solution.status == "infeasible":
         if bound.proven:
             return "no design meets all limits"
-        known = "no design is stable (proved); " if solution.any_stable is False else ""
+        statement = "no design is stable (proved); " if solution.any_stable is False else ""
         advice = not_covered or _advise_certify(bound, "--certify looks for a proof")
-        return _append(f"{known}infeasibility is not proved{_search_effort(bound)}", advice)
+        return _append(f"{statement}infeasibility is not proved{_search_effort(bound)}", advice)
     if not problem.free:
         return "nothing is free, so there is no optimum to prove; tmsopt prove proves the roots"
     if not text:
@@ -50,15 +52,17 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
         count = solution.freedom.count
         family = {1: "a curve", 2: "a surface"}.get(count, f"a {count}-parameter family")
         trace = ", which tmsopt trace follows" if count == 1 else ""
-        more = f"; it belongs to {family} of such designs{trace}" if count > 0 else ""
-        return f"tmsopt prove FILE proves or refutes that this design exists{more}"
+        family_text = f"; it belongs to {family} of such designs{trace}" if count > 0 else ""
+        return f"tmsopt prove FILE proves or refutes that this design exists{family_text}"
     if bound.proven:
         return f"{no_design(problem)} {describe_better(solution, text)} ({bound.method})"
     if math.isfinite(bound.value):
         unit = common_unit(problem, text)
         value, gap = unit.show(bound.value, 6), unit.show(bound.gap, 2)
-        known = f"{no_design(problem)} is {_side(problem)} {value} ({bound.method}), gap {gap}{_search_effort(bound)}"
-        return _append(known, not_covered or _advise_certify(bound, "--certify tries to close it"))
+        statement = (
+            f"{no_design(problem)} is {_side(problem)} {value} ({bound.method}), gap {gap}{_search_effort(bound)}"
+        )
+        return _append(statement, not_covered or _advise_certify(bound, "--certify tries to close it"))
     advice = not_covered or _advise_certify(bound, "--certify looks for a proof or a better design")
     return _append(f"not proved to be the best{_search_effort(bound)}", advice)
 

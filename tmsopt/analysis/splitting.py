@@ -15,14 +15,14 @@ DEVIATION = 0.1
 """Relative deviation of a root from the leading term up to which the law holds."""
 
 _DECADES = range(-16, 1)  # powers of ten at which a law is tested
-_WITHIN = (0.75, 0.5, 0.25)  # shares of the decade before the first failure that are tested too
-_SCALES = 2  # decades over which a law must hold on both sides to be confirmed
-_SLOWER = 1e-13  # relative coefficient that counts as 0: its roots are far slower than those of the law
-_STILL = (1e-2, 1e-4)  # changes at which unmoved roots are counted
-_SMALL = (1e-11, 1e-8, 1e-5)  # radii for that count, relative to the least shift or to the size of the roots
-_WIDE = (1e-3, 3e-2)  # further radii where other roots move
-_CLEAR = 2  # smallest shift that is tested, relative to the scatter of the roots
-_SCATTER = 8  # radius for the count where nothing moves, relative to the scatter of the roots
+_DECADE_SHARES = (0.75, 0.5, 0.25)  # shares of the decade before the first failure that are tested too
+_MIN_DECADES = 2  # decades over which a law must hold on both sides to be confirmed
+_NEGLIGIBLE_SHARE = 1e-13  # relative coefficient that counts as 0: its roots are far slower than those of the law
+_COUNTED_CHANGES = (1e-2, 1e-4)  # changes at which unmoved roots are counted
+_SMALL_RADII = (1e-11, 1e-8, 1e-5)  # radii for that count, relative to the least shift or to the size of the roots
+_WIDE_RADII = (1e-3, 3e-2)  # further radii where other roots move
+_MIN_SHIFT = 2  # smallest shift that is tested, relative to the scatter of the roots
+_SCATTER_RADIUS = 8  # radius for the count where nothing moves, relative to the scatter of the roots
 
 
 @dataclass(frozen=True)
@@ -67,12 +67,12 @@ def compute_response(point: RootPoint, name: str) -> Response:
     terms = _terms(point, name)
     if terms is None:
         return Response(name, relative, (), 0, k)
-    found, unmoved = find_branches(terms)
-    laws = [law for branch in found if (law := _confirm(point, name, branch))]
-    if unmoved and not _has_fixed_roots(point, name, found, unmoved):
+    branches, unmoved = find_branches(terms)
+    laws = [law for branch in branches if (law := _confirm(point, name, branch))]
+    if unmoved and not _has_fixed_roots(point, name, branches, unmoved):
         unmoved = 0
-    left = k - unmoved - sum(law.branches.roots for law in laws)
-    return Response(name, relative, tuple(laws), unmoved, left)
+    unresolved = k - unmoved - sum(law.branches.roots for law in laws)
+    return Response(name, relative, tuple(laws), unmoved, unresolved)
 
 
 def _terms(point: RootPoint, name: str) -> list[list[complex]] | None:
@@ -96,7 +96,7 @@ def _terms(point: RootPoint, name: str) -> list[list[complex]] | None:
 def _confirm(point: RootPoint, name: str, branch: Branches) -> Law | None:
     """The law with its range of validity, if the roots obey it at changes of both signs and two sizes; else None."""
     ends = [_validity_range(point, name, branch, sign) for sign in (-1, 1)]
-    if any(high < 10**_SCALES * max(low, 10.0 ** _DECADES[0]) for low, high in ends):
+    if any(high < 10**_MIN_DECADES * max(low, 10.0 ** _DECADES[0]) for low, high in ends):
         return None
     of_s = replace(branch, constants=tuple(c * point.unit**branch.denominator for c in branch.constants))
     return Law(of_s, ends[0][1], ends[1][1], max(low for low, _ in ends))
@@ -111,10 +111,10 @@ def _validity_range(point: RootPoint, name: str, branch: Branches, sign: int) ->
         shifted = _local_coefficients(point, name, sign * eps, scale)
         # A polynomial in 1/t: its largest roots are sought, and companion eigenvalues give these to all digits.
         row = np.array([midpoint(c / shifted[point.multiplicity].abs_upper()) for c in shifted])
-        row[np.cumsum(np.abs(row)) <= _SLOWER * np.abs(row).sum()] = 0  # roots that are far slower
+        row[np.cumsum(np.abs(row)) <= _NEGLIGIBLE_SHARE * np.abs(row).sum()] = 0  # roots that are far slower
         return _deviation(predicted, scale, row) <= DEVIATION
 
-    visible = _CLEAR * _root_scatter(point)
+    visible = _MIN_SHIFT * _root_scatter(point)
     decades = [m for m in _DECADES if max(map(abs, branch.shifts(sign * 10.0**m))) > visible]
     low = next((m for m in decades if holds(10.0**m)), None)
     if low is None:
@@ -123,11 +123,11 @@ def _validity_range(point: RootPoint, name: str, branch: Branches, sign: int) ->
     first = next((m for m in decades if m > low and not holds(10.0**m)), None)
     if first is None:
         return least, 10.0 ** _DECADES[-1]
-    reached = (10.0 ** (first - 1 + share) for share in _WITHIN)
+    reached = (10.0 ** (first - 1 + share) for share in _DECADE_SHARES)
     return least, next(filter(holds, reached), 10.0 ** (first - 1))
 
 
-def _has_fixed_roots(point: RootPoint, name: str, moved: Sequence[Branches], unmoved: int) -> bool:
+def _has_fixed_roots(point: RootPoint, name: str, branches: Sequence[Branches], unmoved: int) -> bool:
     """Whether this many roots stay as a parameter changes, by Rouché's theorem at a few changes."""
 
     def count_roots(eps: float, radius: float) -> int | None:
@@ -137,20 +137,20 @@ def _has_fixed_roots(point: RootPoint, name: str, moved: Sequence[Branches], unm
 
     def radii(eps: float) -> list[float]:
         """Radii, in the root's unit, that should contain the fixed roots only."""
-        if not moved:
-            return [max(small, _SCATTER * _root_scatter(point)) for small in _SMALL]
-        least = min(abs(t) for branch in moved for t in branch.shifts(eps))
-        return [small * least for small in (*_SMALL, *_WIDE)]
+        if not branches:
+            return [max(small, _SCATTER_RADIUS * _root_scatter(point)) for small in _SMALL_RADII]
+        least = min(abs(t) for branch in branches for t in branch.shifts(eps))
+        return [small * least for small in (*_SMALL_RADII, *_WIDE_RADII)]
 
-    changes = [(eps, sign) for eps in _STILL for sign in (-1, 1)]
+    changes = [(eps, sign) for eps in _COUNTED_CHANGES for sign in (-1, 1)]
     return all(any(count_roots(sign * eps, radius) == unmoved for radius in radii(eps)) for eps, sign in changes)
 
 
 def _local_coefficients(point: RootPoint, name: str, eps: float, scale: float) -> list[Any]:
     """Coefficients in t of the perturbed polynomial, corrected for the residual of the unperturbed multiple root."""
     perturbed = point.taylor(point.perturb(name, eps * point.step(name)), scale)
-    own = point.expand(scale)
-    return [a - b if j < point.multiplicity else a for j, (a, b) in enumerate(zip(perturbed, own, strict=True))]
+    unperturbed = point.expand(scale)
+    return [a - b if j < point.multiplicity else a for j, (a, b) in enumerate(zip(perturbed, unperturbed, strict=True))]
 
 
 def _root_scatter(point: RootPoint) -> float:
@@ -167,10 +167,10 @@ def _deviation(predicted: Sequence[complex], scale: float, row: NDArray[np.compl
         row: coefficients of the polynomial in scale/t, descending.
     """
     inverse = np.roots(row) if np.all(np.isfinite(row)) else np.zeros(0)
-    left, worst = list(scale / inverse[inverse != 0]), 0.0
+    true_shifts, worst = list(scale / inverse[inverse != 0]), 0.0
     for t in predicted:
-        nearest = min(range(len(left)), key=lambda i: abs(left[i] - t), default=None)
+        nearest = min(range(len(true_shifts)), key=lambda i: abs(true_shifts[i] - t), default=None)
         if nearest is None:
             return np.inf
-        worst = max(worst, abs(left.pop(nearest) - t) / abs(t))
+        worst = max(worst, abs(true_shifts.pop(nearest) - t) / abs(t))
     return float(worst)

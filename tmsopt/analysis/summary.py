@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.analysis.limits import is_physical
+from tmsopt.analysis.limits import is_physical, split_bound
 from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import describe_user_structure
 from tmsopt.problem.problem import Posed
@@ -14,10 +14,10 @@ from tmsopt.problem.quantities import ROOT_QUANTITIES
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import unit_of
 
-_ROOTS = {q.name for q in ROOT_QUANTITIES}
-_SHARES = (0.0, 0.29, 0.5, 0.83, 1.0)  # of a range: the points at which an effect is looked for
-_UNCHANGED = 1e-13  # relative: rounding of a few operations
-_AT = 1e-12  # relative distance to a bound that counts as touching it
+_ROOT_NAMES = {q.name for q in ROOT_QUANTITIES}
+_RANGE_SHARES = (0.0, 0.29, 0.5, 0.83, 1.0)  # of a range: the points at which an effect is looked for
+_ROUNDING = 1e-13  # relative: rounding of a few operations
+_BOUND_DISTANCE = 1e-12  # relative distance to a bound that counts as touching it
 
 
 def summarise(solution: Solution) -> str:
@@ -100,15 +100,14 @@ def _active_bound_warning(solution: Solution) -> Iterator[str]:
 
 
 def _describe_bound(problem: Posed, bound: str) -> str:
-    name, end = bound.rsplit(".", 1)
-    return unit_of(problem, name).show(problem.free[name][end == "max"], 10)
+    return unit_of(problem, bound).show(split_bound(problem, bound)[2], 10)
 
 
 def _touched_bound_warnings(solution: Solution, name: str) -> Iterator[str]:
     problem, x = solution.problem.posed, solution.parameters[name]
     for end, limit in zip(("min", "max"), problem.free[name], strict=True):
         bound = f"{name}.{end}"
-        if bound not in solution.active and abs(x - limit) <= _AT * max(abs(limit), _AT):
+        if bound not in solution.active and abs(x - limit) <= _BOUND_DISTANCE * max(abs(limit), _BOUND_DISTANCE):
             why = "to first order, relaxing it improves nothing" if problem.objective else "nothing was optimised"
             yield f"{name} is at {bound} = {_describe_bound(problem, bound)}; {why}"
 
@@ -117,7 +116,7 @@ def _idle_warning(solution: Solution, name: str) -> str:
     """A warning for a parameter without effect on goal and limits; empty for one with an effect."""
     problem = solution.problem.posed
     lower, upper = problem.free[name]
-    points = [solution.parameters[name], *(lower + share * (upper - lower) for share in _SHARES)]
+    points = [solution.parameters[name], *(lower + share * (upper - lower) for share in _RANGE_SHARES)]
     conditions = problem.conditions
     expressions: dict[Any, Expression] = {**conditions, **({None: problem.objective} if problem.objective else {})}
     rows = [_signature(problem, {**solution.parameters, name: x}, expressions.values()) for x in points]
@@ -125,7 +124,7 @@ def _idle_warning(solution: Solution, name: str) -> str:
     affected = [
         n
         for k, (n, e) in enumerate(expressions.items())
-        if _is_varying([[values[k]] for _, values in rows]) or (roots_move and not _ROOTS.isdisjoint(e.names))
+        if _is_varying([[values[k]] for _, values in rows]) or (roots_move and not _ROOT_NAMES.isdisjoint(e.names))
     ]
     if (problem.locate and roots_move) or None in affected:
         return ""
@@ -133,8 +132,8 @@ def _idle_warning(solution: Solution, name: str) -> str:
         return ""  # it moves the optimum through an active constraint
     goals = " and ".join(filter(None, (problem.locate, problem.goal)))
     ends = " to ".join(_describe_bound(problem, f"{name}.{end}") for end in ("min", "max"))
-    kept = f" that satisfies {', '.join(affected)}" if affected else ""
-    return f"{name} has no effect on {goals} here: any value from {ends}{kept} works"
+    condition = f" that satisfies {', '.join(affected)}" if affected else ""
+    return f"{name} has no effect on {goals} here: any value from {ends}{condition} works"
 
 
 def _signature(
@@ -143,7 +142,7 @@ def _signature(
     """Monic coefficients, and the values of expressions at fixed root quantities."""
     values = problem.values(problem.ordered(parameters))
     a = np.array([float(c) for c in values.coefficients])
-    values = values.with_known(dict.fromkeys(_ROOTS, 0.5))
+    values = values.with_known(dict.fromkeys(_ROOT_NAMES, 0.5))
     with np.errstate(all="ignore"):
         return list(a / a[0]), [float(e(values)) for e in expressions]
 
@@ -153,4 +152,4 @@ def _is_varying(rows: list[list[float]]) -> bool:
     table = np.array(rows)
     if not np.all(np.isfinite(table)):
         return True
-    return bool(np.any(np.ptp(table, axis=0) > _UNCHANGED * np.abs(table).max()))
+    return bool(np.any(np.ptp(table, axis=0) > _ROUNDING * np.abs(table).max()))

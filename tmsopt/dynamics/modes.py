@@ -13,7 +13,9 @@ _MIN_POINTS, _MIN_SHARE = (
     3,
     1e-4,
 )  # of a piece, and of the range; rounding errors make shorter pieces, which are ignored
-_ISOLATED = 0.5  # two roots meet without a third if their distance is at most this share of the distance to the third
+_ISOLATED_RATIO = (
+    0.5  # two roots meet without a third if their distance is at most this share of the distance to the third
+)
 
 
 @dataclass(frozen=True)
@@ -67,8 +69,8 @@ def follow_modes(
     first = nearest if not typical or (not over_speed and nearest in typical) else typical[-1]
     names = {first: _name_modes(parts[first], design, is_bicycle)}
     for order in (range(first, len(parts)), range(first, -1, -1)):
-        for before, k in pairwise(order):
-            new_names = _pass_names(parts[before], names[before], parts[k], forward=k > before)
+        for previous, k in pairwise(order):
+            new_names = _pass_names(parts[previous], names[previous], parts[k], forward=k > previous)
             is_mixed = is_bicycle and any("weave +" in name or "+ weave" in name for name in new_names)
             names[k] = new_names if new_names and not is_mixed else _name_modes(parts[k], design, is_bicycle)
     return tuple(
@@ -103,7 +105,7 @@ def _match(a: Complex, b: Complex) -> NDArray[np.intp]:
         return order[::-1] if squares[order, order[::-1]].sum() < squares.trace() else order
     from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import, and is rarely needed
 
-    return np.asarray(linear_sum_assignment(squares)[1])
+    return linear_sum_assignment(squares)[1]
 
 
 def _name_modes(part: _Piece, design: float, is_bicycle: bool) -> list[str]:
@@ -127,15 +129,22 @@ def _pass_names(old: _Piece, names: list[str], new: _Piece, forward: bool) -> li
     r, p = (part.roots[-1 if (part is old) == forward else 0] for part in (many, few))
     i = int(np.diff(r[: many.real].real).argmin())  # real roots i and i + 1 form the pair j
     j = few.real + int(p[few.real :].imag.argmin())
-    others, rest = np.delete(np.arange(len(r)), [i, i + 1]), np.delete(np.arange(len(p)), j)
-    distances = [np.abs(x - y).min(initial=np.inf) for x, y in ((r[others], r[i : i + 2].mean()), (p[rest], p[j].real))]
-    if abs(r[i + 1] - r[i]) > _ISOLATED * distances[0] or 2 * p[j].imag > _ISOLATED * distances[1]:
+    other_reals, other_roots = np.delete(np.arange(len(r)), [i, i + 1]), np.delete(np.arange(len(p)), j)
+    distances = [
+        np.abs(x - y).min(initial=np.inf)
+        for x, y in ((r[other_reals], r[i : i + 2].mean()), (p[other_roots], p[j].real))
+    ]
+    if abs(r[i + 1] - r[i]) > _ISOLATED_RATIO * distances[0] or 2 * p[j].imag > _ISOLATED_RATIO * distances[1]:
         return []
-    rest[few.real :] = rest[few.real :][_match(r[others[few.real :]], p[rest[few.real :]])]  # real ones stay in order
+    other_roots[few.real :] = other_roots[few.real :][
+        _match(r[other_reals[few.real :]], p[other_roots[few.real :]])
+    ]  # real ones stay in order
     if many is old:
         both = names[i] if names[i] == names[i + 1] else f"{names[i + 1]} + {names[i]}"
-        new_names = {j: both} | {b: names[a] for a, b in zip(others, rest, strict=True)}
+        new_names = {j: both} | {b: names[a] for a, b in zip(other_reals, other_roots, strict=True)}
     else:
         upper, _, lower = names[j].partition(" + ")
-        new_names = {i: lower or upper, i + 1: upper} | {a: names[b] for a, b in zip(others, rest, strict=True)}
+        new_names = {i: lower or upper, i + 1: upper} | {
+            a: names[b] for a, b in zip(other_reals, other_roots, strict=True)
+        }
     return [new_names[k] for k in range(len(new_names))]

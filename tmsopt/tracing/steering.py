@@ -1,4 +1,4 @@
-"""Follows one curve point by point: an iterator that a user can stop and turn around."""
+"""Follows one curve point by point, by an iterator that a user can stop and reverse."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -27,10 +27,10 @@ def continue_from(
     """Follow one curve of a pattern point by point, from a point near a design.
 
     Args:
-        problem: as for `trace`; the curve of a solution begins at its parameters.
+        problem: as for `trace`. For a solution, the curve begins at its parameters.
         pattern: name; by default the one that the problem locates.
-        through: a point to begin near, with a value for every free parameter; by default the parameters of a solution,
-            or the first from which the search of `trace` finds a point.
+        through: a design near which the curve begins, with a value for every free parameter. The default is the
+            parameters of a solution, or the first design from which the search of `trace` finds a point.
         step: longest step, in widths of the box.
         events: events to locate in addition to the built-in ones.
 
@@ -65,12 +65,12 @@ def continue_from(
 
 
 class Continuation(Iterator[BranchPoint]):
-    """Iterator of the points of one curve, events located among them; `continue_from` makes it.
+    """Iterator over the points of one curve, which include its events; `continue_from` makes it.
 
-    It ends where the curve leaves the box, closes or has no direction, and at an event that stops it.
+    It ends where the curve leaves the box, closes or has no direction, and at an event that stops the curve.
 
     Attributes:
-        end: why there are no more points, in words; empty while there are more.
+        end: why there are no more points, in words; empty as long as there are more points.
 
     Example:
         >>> curve = tmsopt.continue_from("problems/ep_set.toml", step=0.02)
@@ -96,12 +96,12 @@ class Continuation(Iterator[BranchPoint]):
         return next(self._points)
 
     def reverse(self) -> None:
-        """Turn around at the last point; the next one lies behind it."""
+        """Turn around at the last point; the next point lies behind it."""
         self._sign, self.end = -self._sign, ""
         self._points = self._follow(CurvePoint(self._last.y, -self._last.t), fresh=False)
 
     def _follow(self, start: CurvePoint, fresh: bool) -> Iterator[BranchPoint]:
-        """Yield the points after a start, or from it if `fresh`; then set `end`."""
+        """Yield the points after a start, also the start itself if `fresh`; then set `end`."""
         behind = [start]
         for new in follow(self._traced.curve, start, self._step):
             if isinstance(new, End):
@@ -115,7 +115,7 @@ class Continuation(Iterator[BranchPoint]):
                 events = [event for at, event in row_events if at == row]
                 is_repeated = (
                     len(behind) == 1 and np.abs(walk.y[row] - start.y).max() <= SAME_PLACE
-                )  # it turned around there
+                )  # the user turned around at this event
                 if (events and not is_repeated) or row == len(walk.y) - 1 or (fresh and row == first):
                     self._last = CurvePoint(walk.y[row], walk.t[row])
                     self._arclength = arclength + self._sign * float(branch.arclength[row] - branch.arclength[first])
