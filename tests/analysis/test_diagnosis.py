@@ -329,7 +329,7 @@ def test_the_mass_ratio_does_not_move_it(bicycle):
 
 
 def test_a_solution_says_what_its_multiple_root_is():
-    solution = tmsopt.solve(tmsopt.load("problems/ep4.toml"))
+    solution = tmsopt.solve("problems/ep4.toml")
     (found,) = tmsopt.diagnose(solution)
     assert (found.kind, found.partial) == ("defective", (4,))
     assert json.loads(json.dumps(found.to_json(), allow_nan=False))["responses"][0]["laws"][0]["exponent"] == "1/4"

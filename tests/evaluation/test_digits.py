@@ -249,7 +249,7 @@ FILES = sorted(
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.slow
 def test_every_digit_of_the_problem_files(name):
-    assert wrong_digits(printed(tmsopt.solve(tmsopt.load(PROBLEMS / f"{name}.toml")))) == []
+    assert wrong_digits(printed(tmsopt.solve(PROBLEMS / f"{name}.toml"))) == []
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The value of each active limit: its multiplier, checked by solving again with the limit moved."""
+"""Computes the value of each active limit: its multiplier, which is checked by moving the limit and solving again."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -21,10 +21,10 @@ from tmsopt.records import plain
 from tmsopt.search.solve import solve_any_status
 
 DIFFERS = 0.2
-"""Relative difference between predicted and resolved gain above which the reason is reported."""
+"""Relative difference between predicted and resolved gain above which the report gives a reason."""
 
-_RETRY_STARTS = 8  # starts of the second search, if the first from the optimum alone gives another gain
-_NOISE = 1e-8  # difference, relative to the objective, that is not significant
+_RETRY_STARTS = 8  # starts of the second search, if the first search, from the optimum only, gives a different gain
+_NOISE = 1e-8  # largest difference, relative to the objective, that is not significant
 
 
 @dataclass(frozen=True)
@@ -32,16 +32,16 @@ class Lever:
     """An active limit and the gain from moving it. A gain is positive where the objective improves.
 
     Attributes:
-        name: of the constraint, or a bound such as ``Fr.max``.
+        name: name of the constraint, or a bound such as ``Fr.max``.
         kind: ``bound`` or ``constraint``.
         limit: the limit, in the unit in which the problem is written.
         physical: whether the limit is a physical end, such as 0 for a mass, and cannot be moved.
         move: the change of the limit in words, e.g. ``raising lambda_s.max by 1 deg``.
-        step: signed change of the limit in the unit of the parameter; 0 where it cannot be moved.
-        per_unit: gain per unit of that change, to first order (the multiplier).
-        resolved: gain found by solving the problem with the limit moved; nan where that was not done or failed.
-        structure: of the new optimum; empty without one.
-        reason: why the two gains differ, or why there is only one.
+        step: signed change of the limit in the unit of the parameter; 0 if the limit cannot be moved.
+        per_unit: gain per unit of this change, to first order (the multiplier).
+        resolved: gain after solving the problem with the moved limit; nan if this was not done or failed.
+        structure: structure of the new optimum; empty without a new optimum.
+        reason: why the two gains differ, or why there is only one gain.
         gained: unit of the gains.
     """
 
@@ -64,7 +64,7 @@ class Lever:
 
     @property
     def relative(self) -> float:
-        """Resolved minus first-order gain, relative to the latter."""
+        """Resolved gain minus first-order gain, relative to the first-order gain."""
         return (self.resolved - self.predicted) / self.predicted if self.predicted else math.nan
 
     @property
@@ -95,7 +95,7 @@ class Lever:
 
 
 def find_levers(solution: Solution, resolve: bool = True, progress: Counts | None = None) -> tuple[Lever, ...]:
-    """One lever for each active limit of an optimum, the most valuable step first."""
+    """One lever for each active limit of an optimum; the most valuable lever comes first."""
     if solution.status != "optimal":
         return ()
     levers = [_first_order_lever(solution, name) for name in solution.active]
@@ -116,8 +116,8 @@ def split_bound(problem: Posed, bound: str) -> tuple[str, bool, float]:
 def is_physical(problem: Posed, bound: str) -> bool:
     """Whether a bound such as ``mu.min`` is a physical end of its parameter's range."""
     name, is_upper, value = split_bound(problem, bound)
-    allowed = problem.parameter_set[name].range
-    return value == (allowed.upper if is_upper else allowed.lower)
+    physical_range = problem.parameter_set[name].range
+    return value == (physical_range.upper if is_upper else physical_range.lower)
 
 
 def move_limit(problem: Posed, name: str, step: float) -> Posed:
@@ -125,7 +125,7 @@ def move_limit(problem: Posed, name: str, step: float) -> Posed:
     if name in problem.constraints:
         text = problem.constraints[name]
         limit = split_limit(text)
-        if limit and not limit.behind:  # the number on the right
+        if limit and not limit.behind:  # the number is the right-hand side
             text = limit.replace_number(repr(limit.value + step))
         else:
             left, sign, right = written_sides(text)
@@ -153,7 +153,7 @@ def _first_order_lever(solution: Solution, name: str) -> Lever:
         return Lever(name, "constraint", limit_shown, False, words, sign * natural.size, abs(multiplier), gained=gained)
     parameter_name, is_upper, limit = split_bound(problem, name)
     parameter, width = problem.parameter_set[parameter_name], float(np.ptp(problem.free[parameter_name]))
-    # the size of an angle is the width of its range, because 0 is a tilt like any other
+    # the size of an angle is the width of its range, because a tilt of 0 is not special
     size = width if parameter.unit == "rad" or not limit else min(abs(limit), width)
     unit, direction = unit_of(problem, parameter_name), 1.0 if is_upper else -1.0
     step = step_within(unit, parameter.unit, size, limit, direction, parameter.range)
@@ -163,19 +163,21 @@ def _first_order_lever(solution: Solution, name: str) -> Lever:
 
 
 def _solve_moved(solution: Solution, problem: Posed, starts: int, sample: bool) -> Solution:
-    """Solve a problem with moved limits from the optimum; `sample`: search the whole box too."""
+    """Solve a problem with moved limits, starting at the optimum; with `sample`, also search the whole box."""
     options = replace(DEFAULTS, starts=starts, near={n: solution.parameters[n] for n in problem.free})
     return solve_any_status(problem, options, without_sample=not sample, bound=False)
 
 
 def _has_remote_optimum(solution: Solution, levers: Sequence[Lever]) -> bool:
-    """Whether moving all limits at once makes a design elsewhere better than the one that the optimum leads to."""
+    """Whether, with all limits moved, a design elsewhere is better than the optimum near the present one."""
     problem = solution.problem.posed
     for lever in levers:
         with suppress(InputError):
             problem = move_limit(problem, lever.name, lever.step)
-    near, whole = (_solve_moved(solution, problem, 1, sample) for sample in (False, True))
-    return near.status != "optimal" or problem.sign * (near.value - whole.value) > _NOISE * (1 + abs(solution.value))
+    near_solution, box_solution = (_solve_moved(solution, problem, 1, sample) for sample in (False, True))
+    return near_solution.status != "optimal" or problem.sign * (near_solution.value - box_solution.value) > _NOISE * (
+        1 + abs(solution.value)
+    )
 
 
 def _resolve_lever(solution: Solution, lever: Lever, sample: bool) -> Lever:
@@ -184,18 +186,20 @@ def _resolve_lever(solution: Solution, lever: Lever, sample: bool) -> Lever:
         problem = move_limit(solution.problem.posed, lever.name, lever.step)
     except InputError:
         return replace(lever, reason="the problem with this limit moved is not valid")
-    best = None
+    best_solution = None
     for starts in (1, _RETRY_STARTS):
         new_solution = _solve_moved(solution, problem, starts, sample or starts > 1)
-        if new_solution.status == "optimal" and not (best and problem.sign * (new_solution.value - best.value) >= 0):
-            best = new_solution
-            gain = -problem.sign * (best.value - solution.value)
-            lever = replace(lever, resolved=gain, structure=best.structure)
+        if new_solution.status == "optimal" and not (
+            best_solution and problem.sign * (new_solution.value - best_solution.value) >= 0
+        ):
+            best_solution = new_solution
+            gain = -problem.sign * (best_solution.value - solution.value)
+            lever = replace(lever, resolved=gain, structure=best_solution.structure)
             if abs(lever.relative) <= DIFFERS:
                 return lever
-    if best is None:
+    if best_solution is None:
         return replace(lever, reason=f"the problem with this limit moved is {new_solution.status.replace('_', ' ')}")
-    return replace(lever, reason=", ".join(_explain_difference(solution, best)))
+    return replace(lever, reason=", ".join(_explain_difference(solution, best_solution)))
 
 
 def _explain_difference(solution: Solution, new_solution: Solution) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""How a multiple root splits under a small change: the leading terms of Puiseux series, by Newton's polygon."""
+"""Computes how a multiple root splits under a small change: leading terms of Puiseux series, by Newton's polygon."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,9 +9,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-_SAME_COEFFICIENT = (
-    1e-9  # relative difference of coefficients up to which an edge counts as the power of a linear polynomial
-)
+_SAME_COEFFICIENT = 1e-9  # relative difference of coefficients up to which a polynomial is a power of a linear one
 
 
 @dataclass(frozen=True)
@@ -20,7 +18,7 @@ class Branches:
 
     Attributes:
         roots: number of roots.
-        constants: one for each cycle of `denominator` roots.
+        constants: one constant for each group of `denominator` roots.
     """
 
     roots: int
@@ -48,10 +46,10 @@ class Branches:
 
 
 def find_branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, ...], int]:
-    """Branches of Σ terms[m][j] ε^m t^j = 0 that start at t = 0, fastest first, and the number of unmoved roots.
+    """Branches of Σ terms[m][j] ε^m t^j = 0 that start at t = 0, the fastest first, and the number of unmoved roots.
 
-    The last j is the multiplicity, and terms[0][j] is 0 for all j below it. Zeros must be exact. Roots that do not move
-    in the given orders count as unmoved.
+    The largest j is the multiplicity, and terms[0][j] is 0 for all smaller j. Zeros must be exact. Roots that do not
+    move in the given orders of ε count as unmoved.
     """
     k = len(terms[0]) - 1
     first = {j: next((m for m, row in enumerate(terms) if row[j] != 0), None) for j in range(k + 1)}
@@ -71,7 +69,7 @@ def find_branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, .
 
 
 def _roots(polynomial: NDArray[np.complex128]) -> tuple[complex, ...]:
-    """Roots of the polynomial of an edge; for the power of a linear polynomial their mean, k times."""
+    """Roots of the polynomial of an edge; if it is the power of a linear polynomial, the mean of its roots, k times."""
     k = len(polynomial) - 1
     mean = -polynomial[1] / (k * polynomial[0])
     power = polynomial[0] * np.poly(np.full(k, mean))

@@ -1,4 +1,4 @@
-"""One sentence each on the structure of a solution and on what is proved about it."""
+"""Sentences about the structure of a solution and about the proofs of its quality."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ _NOT_COVERED = {ANGULAR_FREQUENCY: "frequencies", RADIUS: "the robustness radius
 
 
 def structure_line(problem: Posed, structure: str, abscissa: float, multiple_roots: Sequence[MultipleRoot]) -> str:
-    """The structure of the roots, and whether its multiple root is defective where that is not so or unknown.
+    """The structure of the roots. If its multiple root is not defective, or this is unknown, the sentence says so.
 
     Args:
         multiple_roots: the multiple roots, rightmost first.
@@ -33,7 +33,7 @@ def structure_line(problem: Posed, structure: str, abscissa: float, multiple_roo
 
 
 def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
-    """Whether it is proved that no solution is better, and if not, how to go on."""
+    """Whether it is proved that no solution is better; if not, what the user can do."""
     bound, problem = solution.bound, solution.problem.posed
     text = (problem.minimize or problem.maximize or "").strip()
     names = [words for name, words in _NOT_COVERED.items() if problem.asks(name)]
@@ -96,7 +96,7 @@ def _append(text: str, advice: str) -> str:
 
 
 def _advise_certify(bound: Bound, first: str) -> str:
-    """Advice on --certify: twice the time where it ran out, none where branch and bound cannot take the problem."""
+    """Advice on --certify: twice the time if the time ran out; empty if branch and bound cannot solve the problem."""
     if not bound.solver:
         return first
     return f"--certify {max(2 * math.ceil(bound.seconds), 1)} continues the search" if bound.seconds else ""

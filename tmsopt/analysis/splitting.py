@@ -1,4 +1,4 @@
-"""Splitting of a multiple root under a changing parameter: laws from Newton's polygon, each confirmed by the roots."""
+"""Finds laws by which a multiple root splits when a parameter changes, and confirms each law by computed roots."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,17 +12,17 @@ from tmsopt.analysis.puiseux import Branches, find_branches
 from tmsopt.analysis.root_point import RootPoint, coefficients_of_order, midpoint
 
 DEVIATION = 0.1
-"""Relative deviation of a root from the leading term up to which the law holds."""
+"""Largest relative deviation of a root from the leading term for which the law holds."""
 
 _DECADES = range(-16, 1)  # powers of ten at which a law is tested
 _DECADE_SHARES = (0.75, 0.5, 0.25)  # shares of the decade before the first failure that are tested too
 _MIN_DECADES = 2  # decades over which a law must hold on both sides to be confirmed
-_NEGLIGIBLE_SHARE = 1e-13  # relative coefficient that counts as 0: its roots are far slower than those of the law
+_NEGLIGIBLE_SHARE = 1e-13  # share of coefficients that count as 0, because their roots move far more slowly
 _COUNTED_CHANGES = (1e-2, 1e-4)  # changes at which unmoved roots are counted
-_SMALL_RADII = (1e-11, 1e-8, 1e-5)  # radii for that count, relative to the least shift or to the size of the roots
-_WIDE_RADII = (1e-3, 3e-2)  # further radii where other roots move
-_MIN_SHIFT = 2  # smallest shift that is tested, relative to the scatter of the roots
-_SCATTER_RADIUS = 8  # radius for the count where nothing moves, relative to the scatter of the roots
+_SMALL_RADII = (1e-11, 1e-8, 1e-5)  # radii for this count, relative to the smallest shift or to the size of the roots
+_WIDE_RADII = (1e-3, 3e-2)  # further radii if other roots move
+_MIN_SHIFT = 2  # smallest shift that is tested, relative to the distance of the roots that nearly meet
+_SCATTER_RADIUS = 8  # radius for the count if no root moves, relative to the same distance
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ class Law:
 
     Attributes:
         branches: tᵠ = C εᵖ for the shift t of each root, to leading order.
-        below, above: |ε| up to which every sampled shift is within `DEVIATION` of the law, for ε < 0 and ε > 0; sampled
-            at each decade from 1e-16 to 1, and four times in the last decade that holds.
-        least: |ε| from which the law holds; 0 if at every decade. If the root is multiple only within rounding, shifts
-            below the distance of the scattered roots are not tested.
+        below, above: |ε| up to which every sampled shift is within `DEVIATION` of the law, for ε < 0 and ε > 0. Samples
+            are at each power of ten from 1e-16 to 1, and at four points of the last decade in which the law holds.
+        least: |ε| from which the law holds; 0 if it holds from the first sample. If the root is multiple only up to
+            rounding errors, shifts below the distance of the nearby roots are not tested.
     """
 
     branches: Branches
@@ -48,10 +48,10 @@ class Response:
     """Response of a multiple root to one parameter.
 
     Attributes:
-        relative: whether ε is relative to the parameter's value; it is absolute where that is 0 within rounding.
-        laws: fastest first, only those confirmed by the roots at changes that differ by a factor of 100.
-        unmoved: number of roots that stay, to the orders computed.
-        unresolved: number of roots for which neither was confirmed.
+        relative: whether ε is relative to the parameter's value; it is absolute if the value is 0 up to rounding.
+        laws: the laws that computed roots confirm over a factor of 100 of ε; the fastest law comes first.
+        unmoved: number of roots that do not move, in the computed orders of ε.
+        unresolved: number of roots that follow no confirmed law and for which it is not confirmed that they stay.
     """
 
     parameter: str
@@ -76,7 +76,9 @@ def compute_response(point: RootPoint, name: str) -> Response:
 
 
 def _terms(point: RootPoint, name: str) -> list[list[complex]] | None:
-    """terms[m][j] of ε^m t^j, with t in the root's unit and 0 where rounding allows it; None where undefined.
+    """terms[m][j] of ε^m t^j, with t in the unit of the root; None if they are undefined.
+
+    A term is 0 if it may be 0 within rounding errors.
 
     With g independent eigenvectors, p is to leading order the determinant of a g × g matrix that vanishes at the root,
     so terms of total order below g are 0.
@@ -94,7 +96,7 @@ def _terms(point: RootPoint, name: str) -> list[list[complex]] | None:
 
 
 def _confirm(point: RootPoint, name: str, branch: Branches) -> Law | None:
-    """The law with its range of validity, if the roots obey it at changes of both signs and two sizes; else None."""
+    """The law with its range of validity; None unless roots obey it for both signs of ε and over two decades."""
     ends = [_validity_range(point, name, branch, sign) for sign in (-1, 1)]
     if any(high < 10**_MIN_DECADES * max(low, 10.0 ** _DECADES[0]) for low, high in ends):
         return None
@@ -103,15 +105,15 @@ def _confirm(point: RootPoint, name: str, branch: Branches) -> Law | None:
 
 
 def _validity_range(point: RootPoint, name: str, branch: Branches, sign: int) -> tuple[float, float]:
-    """The least and the largest sampled |ε| between which the roots obey the law; (0, 0) if nowhere."""
+    """The smallest and the largest sampled |ε| between which the roots obey the law; (0, 0) if they never do."""
 
     def holds(eps: float) -> bool:
         predicted = branch.shifts(sign * eps)
         scale = max(map(abs, predicted))
         shifted = _local_coefficients(point, name, sign * eps, scale)
-        # A polynomial in 1/t: its largest roots are sought, and companion eigenvalues give these to all digits.
+        # In the variable 1/t the smallest t are the largest roots, which companion eigenvalues give to all digits.
         row = np.array([midpoint(c / shifted[point.multiplicity].abs_upper()) for c in shifted])
-        row[np.cumsum(np.abs(row)) <= _NEGLIGIBLE_SHARE * np.abs(row).sum()] = 0  # roots that are far slower
+        row[np.cumsum(np.abs(row)) <= _NEGLIGIBLE_SHARE * np.abs(row).sum()] = 0  # roots that move far more slowly
         return _deviation(predicted, scale, row) <= DEVIATION
 
     visible = _MIN_SHIFT * _root_scatter(point)
@@ -119,28 +121,28 @@ def _validity_range(point: RootPoint, name: str, branch: Branches, sign: int) ->
     low = next((m for m in decades if holds(10.0**m)), None)
     if low is None:
         return 0.0, 0.0
-    least = 10.0**low if low > _DECADES[0] else 0.0
+    lower_end = 10.0**low if low > _DECADES[0] else 0.0
     first = next((m for m in decades if m > low and not holds(10.0**m)), None)
     if first is None:
-        return least, 10.0 ** _DECADES[-1]
-    reached = (10.0 ** (first - 1 + share) for share in _DECADE_SHARES)
-    return least, next(filter(holds, reached), 10.0 ** (first - 1))
+        return lower_end, 10.0 ** _DECADES[-1]
+    samples = (10.0 ** (first - 1 + share) for share in _DECADE_SHARES)
+    return lower_end, next(filter(holds, samples), 10.0 ** (first - 1))
 
 
 def _has_fixed_roots(point: RootPoint, name: str, branches: Sequence[Branches], unmoved: int) -> bool:
-    """Whether this many roots stay as a parameter changes, by Rouché's theorem at a few changes."""
+    """Whether `unmoved` roots stay when a parameter changes, by Rouché's theorem for a few changes."""
 
     def count_roots(eps: float, radius: float) -> int | None:
-        """Number of roots within a radius; None where no term outweighs all others there."""
+        """Number of roots within a radius; None if no term is larger than the sum of all others."""
         terms = [abs(x) for x in _local_coefficients(point, name, eps, radius)]
         return next((u for u, x in enumerate(terms) if 2 * x > sum(terms, flint.arb(0))), None)
 
     def radii(eps: float) -> list[float]:
-        """Radii, in the root's unit, that should contain the fixed roots only."""
+        """Radii, in the unit of the root, that should contain only the fixed roots."""
         if not branches:
             return [max(small, _SCATTER_RADIUS * _root_scatter(point)) for small in _SMALL_RADII]
-        least = min(abs(t) for branch in branches for t in branch.shifts(eps))
-        return [small * least for small in (*_SMALL_RADII, *_WIDE_RADII)]
+        least_shift = min(abs(t) for branch in branches for t in branch.shifts(eps))
+        return [small * least_shift for small in (*_SMALL_RADII, *_WIDE_RADII)]
 
     changes = [(eps, sign) for eps in _COUNTED_CHANGES for sign in (-1, 1)]
     return all(any(count_roots(sign * eps, radius) == unmoved for radius in radii(eps)) for eps, sign in changes)
@@ -154,14 +156,14 @@ def _local_coefficients(point: RootPoint, name: str, eps: float, scale: float) -
 
 
 def _root_scatter(point: RootPoint) -> float:
-    """Distance between the roots that nearly meet, in their unit."""
+    """Distance between the roots that nearly meet, in the unit of the root."""
     k = point.multiplicity
     terms = [midpoint(x) for x in point.expand()[: k + 1]]
     return float(max(abs(x / terms[k]) ** (1 / (k - j)) for j, x in enumerate(terms[:k])))
 
 
 def _deviation(predicted: Sequence[complex], scale: float, row: NDArray[np.complex128]) -> float:
-    """The largest relative distance of a predicted shift from its nearest true one; inf if there are too few.
+    """The largest relative distance of a predicted shift from the nearest true shift; inf if these are too few.
 
     Args:
         row: coefficients of the polynomial in scale/t, descending.

@@ -1,4 +1,4 @@
-"""Steps in the unit in which a problem is written: 1 deg of tilt, 1 cm of length, 1 km/h of speed."""
+"""Steps of limits, in the unit in which a problem is written: 1 deg of tilt, 1 cm of length, 1 km/h of speed."""
 
 import math
 from collections.abc import Iterator
@@ -8,8 +8,8 @@ from tmsopt.models import Range
 from tmsopt.problem.unit_system import Unit
 
 _STEP_SHARE = 0.01  # step relative to the size of a number without a natural unit
-_MIN_SHARE = 1e-9  # smallest step, relative to the natural one; a limit closer to its physical end cannot move
-_ZERO_SIZE = 1e-9  # a smaller limit counts as 0, and its size as 1
+_MIN_SHARE = 1e-9  # smallest step, relative to the natural step; a limit closer to its physical end cannot move
+_ZERO_SIZE = 1e-9  # a smaller limit counts as 0, and then its size is 1
 _MAX_SHARES = {"rad": 0.2, "m": 0.05, "m/s": 0.2}
 """Unit → largest natural step, relative to the size of the moved number."""
 
@@ -22,8 +22,8 @@ class LimitStep:
     """A change of a limit.
 
     Attributes:
-        size: positive, in the unit of the parameter.
-        text: in the unit in which the problem is written, e.g. ``1 deg``.
+        size: size of the step, positive, in the unit in which the parameter is stored.
+        text: the step in the unit in which the problem is written, e.g. ``1 deg``.
     """
 
     size: float
@@ -31,24 +31,27 @@ class LimitStep:
 
 
 def natural_step(unit: Unit, stored_unit: str, size: float) -> LimitStep:
-    """The natural step for a number of a size, such as the limit or the width of its range.
+    """The natural step of a limit.
 
     Args:
-        unit: in which the problem is written.
+        unit: the unit in which the problem is written.
         stored_unit: the unit in which the number is stored.
+        size: a typical size of the number, such as the limit or the width of its range.
     """
     return next(_steps(unit, stored_unit, size))
 
 
 def step_within(
-    unit: Unit, stored_unit: str, size: float, limit: float, direction: float, allowed: Range
+    unit: Unit, stored_unit: str, size: float, limit: float, direction: float, physical_range: Range
 ) -> LimitStep | None:
     """The largest natural step that keeps the moved limit physical; None at a physical end."""
-    return next((step for step in _steps(unit, stored_unit, size) if limit + direction * step.size in allowed), None)
+    return next(
+        (step for step in _steps(unit, stored_unit, size) if limit + direction * step.size in physical_range), None
+    )
 
 
 def _steps(unit: Unit, stored_unit: str, size: float) -> Iterator[LimitStep]:
-    """Steps from the natural one down."""
+    """The natural step, and then smaller and smaller steps."""
     size = abs(size) if abs(size) > _ZERO_SIZE else 1.0
     largest = _one_two_five(_NATURAL_STEPS.get(stored_unit, _STEP_SHARE * size) / unit.one)
     while stored_unit in _NATURAL_STEPS and largest * unit.one > _MAX_SHARES[stored_unit] * size:
@@ -60,7 +63,7 @@ def _steps(unit: Unit, stored_unit: str, size: float) -> Iterator[LimitStep]:
 
 
 def _one_two_five(x: float) -> float:
-    """The number 1, 2 or 5 times a power of ten that is nearest to x by ratio."""
+    """The number 1, 2 or 5 times a power of ten whose ratio to x is nearest to 1."""
     decade = math.floor(math.log10(x))
     choices = [k * 10.0**d for d in (decade, decade + 1) for k in (1, 2, 5)]
     nearest = min(choices, key=lambda c: abs(math.log(c / x)))

@@ -1,4 +1,4 @@
-"""A solution in words: its structure, its quality, and warnings."""
+"""Describes a solution in words: its structure, its quality, and warnings."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -15,9 +15,9 @@ from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import unit_of
 
 _ROOT_NAMES = {q.name for q in ROOT_QUANTITIES}
-_RANGE_SHARES = (0.0, 0.29, 0.5, 0.83, 1.0)  # of a range: the points at which an effect is looked for
-_ROUNDING = 1e-13  # relative: rounding of a few operations
-_BOUND_DISTANCE = 1e-12  # relative distance to a bound that counts as touching it
+_RANGE_SHARES = (0.0, 0.29, 0.5, 0.83, 1.0)  # shares of a range at which the effect of a parameter is evaluated
+_ROUNDING = 1e-13  # relative rounding error of a few operations
+_BOUND_DISTANCE = 1e-12  # largest relative distance to a bound for which the bound counts as reached
 
 
 def summarise(solution: Solution) -> str:
@@ -34,7 +34,7 @@ def summarise(solution: Solution) -> str:
 
 
 def list_warnings(solution: Solution) -> tuple[str, ...]:
-    """Active bounds that are arbitrary, bounds touched without a gain, parameters without effect."""
+    """Warnings about arbitrary active bounds, bounds reached without a gain, and parameters without effect."""
     if solution.status == "infeasible":
         return ()
     problem = solution.problem.posed
@@ -53,7 +53,7 @@ def no_design(problem: Posed) -> str:
 
 
 def describe_better(solution: Solution, goal: str) -> str:
-    """The predicate of a sentence about a better design: that it decays faster, or has a smaller or larger goal."""
+    """The predicate of a sentence about a better design: it decays faster, or it has a smaller or larger goal."""
     problem, bound = solution.problem.posed, solution.bound
     by = f" by more than {bound.gap:.1e}" if bound.tolerance else ""
     if goal != "abscissa" or problem.sense == "maximize" or solution.stability.on_edge:
@@ -94,9 +94,9 @@ def _active_bound_warning(solution: Solution) -> Iterator[str]:
     bounds = (f"{name}.{end}" for name in problem.free for end in ("min", "max"))
     active = [bound for bound in bounds if bound in solution.active and bound not in problem.constraints]
     if arbitrary := [bound for bound in active if not is_physical(problem, bound)]:
-        listed = ", ".join(f"{bound} = {_describe_bound(problem, bound)}" for bound in arbitrary)
+        bounds_text = ", ".join(f"{bound} = {_describe_bound(problem, bound)}" for bound in arbitrary)
         advice = "widen the ends that are guesses, and state real limits under [constraints]"
-        yield f"the answer depends on these ends of ranges: {listed}; {advice}"
+        yield f"the answer depends on these ends of ranges: {bounds_text}; {advice}"
 
 
 def _describe_bound(problem: Posed, bound: str) -> str:
@@ -108,12 +108,12 @@ def _touched_bound_warnings(solution: Solution, name: str) -> Iterator[str]:
     for end, limit in zip(("min", "max"), problem.free[name], strict=True):
         bound = f"{name}.{end}"
         if bound not in solution.active and abs(x - limit) <= _BOUND_DISTANCE * max(abs(limit), _BOUND_DISTANCE):
-            why = "to first order, relaxing it improves nothing" if problem.objective else "nothing was optimised"
-            yield f"{name} is at {bound} = {_describe_bound(problem, bound)}; {why}"
+            reason = "to first order, relaxing it improves nothing" if problem.objective else "nothing was optimised"
+            yield f"{name} is at {bound} = {_describe_bound(problem, bound)}; {reason}"
 
 
 def _idle_warning(solution: Solution, name: str) -> str:
-    """A warning for a parameter without effect on goal and limits; empty for one with an effect."""
+    """A warning if a parameter has no effect on goal and limits; empty if it has an effect."""
     problem = solution.problem.posed
     lower, upper = problem.free[name]
     points = [solution.parameters[name], *(lower + share * (upper - lower) for share in _RANGE_SHARES)]
@@ -139,7 +139,7 @@ def _idle_warning(solution: Solution, name: str) -> str:
 def _signature(
     problem: Posed, parameters: dict[str, float], expressions: Iterable[Expression]
 ) -> tuple[list[float], list[float]]:
-    """Monic coefficients, and the values of expressions at fixed root quantities."""
+    """Monic coefficients, and the values of expressions with fixed root quantities."""
     values = problem.values(problem.ordered(parameters))
     a = np.array([float(c) for c in values.coefficients])
     values = values.with_known(dict.fromkeys(_ROOT_NAMES, 0.5))

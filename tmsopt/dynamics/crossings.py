@@ -139,16 +139,16 @@ class _Split:
     Attributes:
         zeros: multiplicity of the root 0 for every y.
         mirrored: product of the distinct factors that are even in s, with roots s and −s.
-        rest: product of the other distinct factors.
-        once: p without repeated factors: mirrored times rest, times s if s divides p.
+        other_factors: product of the other distinct factors.
+        squarefree: p without repeated factors: mirrored times other_factors, times s if s divides p.
         repeated: whether a factor other than s is repeated.
         repeats_mirrored: whether an even factor is repeated.
     """
 
     zeros: int
     mirrored: list[Any]
-    rest: list[Any]
-    once: list[Any]
+    other_factors: list[Any]
+    squarefree: list[Any]
     repeated: bool
     repeats_mirrored: bool
 
@@ -160,19 +160,21 @@ def _split_factors(p: Any) -> _Split:
     once = math.prod((f for f, _ in factors), start=_S**0)
     mirrored = once.gcd(once.compose(-_S, _Y))
     repeats_mirrored = p.gcd(p.compose(-_S, _Y)).degrees()[0] > mirrored.degrees()[0]
-    rest, single = _rows(once / mirrored), _rows(once * _S if zeros else once)
-    return _Split(zeros, _rows(mirrored), rest, single, any(times > 1 for _, times in factors), repeats_mirrored)
+    other_factors, squarefree = _rows(once / mirrored), _rows(once * _S if zeros else once)
+    return _Split(
+        zeros, _rows(mirrored), other_factors, squarefree, any(times > 1 for _, times in factors), repeats_mirrored
+    )
 
 
 def _event_polynomials(a: Sequence[Any], split: _Split) -> dict[str, Any]:
     """Polynomials in y whose roots are the crossings of each kind."""
-    even, odd = (_bivariate(split.rest[::-1][k::2]) for k in (0, 1))
-    once = _bivariate(split.once[::-1])
+    even, odd = (_bivariate(split.other_factors[::-1][k::2]) for k in (0, 1))
+    once = _bivariate(split.squarefree[::-1])
     return {
-        "capsize": split.mirrored[-1] * split.rest[-1],
+        "capsize": split.mirrored[-1] * split.other_factors[-1],
         "infinity": a[0],
-        "weave": _rows(even.resultant(odd, "s"))[0] if len(split.rest) > 1 else flint.fmpq_poly(),
-        "EP2": _rows(once.discriminant("s"))[0] if len(split.once) > 1 else flint.fmpq_poly(),
+        "weave": _rows(even.resultant(odd, "s"))[0] if len(split.other_factors) > 1 else flint.fmpq_poly(),
+        "EP2": _rows(once.discriminant("s"))[0] if len(split.squarefree) > 1 else flint.fmpq_poly(),
     }
 
 
@@ -202,7 +204,7 @@ def _isolate_real_roots(polynomial: Any, lower: Any, upper: Any | None) -> list[
 
 def _is_marginal(split: _Split, y: Any) -> bool:
     """Whether no root is right of the axis and all roots on the axis are simple, apart from roots 0."""
-    others, mirrored = _evaluate_at(split.rest, y), _evaluate_at(split.mirrored, y)
+    others, mirrored = _evaluate_at(split.other_factors, y), _evaluate_at(split.mirrored, y)
     if split.repeats_mirrored or not _classify(others)[0]:
         return False
     return all(w.im == 0 and w.re < 0 for w in exact_roots(mirrored[::2]))  # in w = s²
@@ -227,8 +229,8 @@ def _find_events(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator
 
     holds: dict[str, Callable[[Root], bool]] = {
         "capsize": lambda r: r.re == r.im == 0,
-        "weave": lambda r: r.re == 0 < r.im and count_roots(split.rest, r) > 0,
-        "EP2": lambda r: r.multiplicity > 1 and r.im >= 0 and count_roots(split.once, r) > 1,
+        "weave": lambda r: r.re == 0 < r.im and count_roots(split.other_factors, r) > 0,
+        "EP2": lambda r: r.multiplicity > 1 and r.im >= 0 and count_roots(split.squarefree, r) > 1,
     }
     for root in filter(holds[kind], roots):
         name = f"{'CEP' if root.im else 'EP'}{root.multiplicity}" if kind == "EP2" else kind
@@ -256,10 +258,10 @@ def _cluster_roots(coefficients: Sequence[Any], size: float) -> list[Root]:
     groups: list[Root] = []
     while remaining_roots:
         z = complex(remaining_roots[0].re, remaining_roots[0].im)
-        near = [r for r in remaining_roots if abs(complex(r.re, r.im) - z) <= _SAME_ROOT * size]
-        remaining_roots = [r for r in remaining_roots if r not in near]
+        near_roots = [r for r in remaining_roots if abs(complex(r.re, r.im) - z) <= _SAME_ROOT * size]
+        remaining_roots = [r for r in remaining_roots if r not in near_roots]
         re, im = (x if abs(x) > _SAME_ROOT * size else 0.0 for x in (z.real, z.imag))
-        groups.append(Root(re, im, sum(r.multiplicity for r in near)))
+        groups.append(Root(re, im, sum(r.multiplicity for r in near_roots)))
     return groups
 
 
@@ -280,10 +282,10 @@ def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tupl
             yield float(low), float(high), (low + high) / 2
 
 
-def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) -> tuple[Stretch, ...]:
+def _bands(cells: Sequence[tuple[float, float, Any]], is_inside: Sequence[bool]) -> tuple[Stretch, ...]:
     """The intervals that are inside. Adjacent ones are merged, even if the single point between them is not inside."""
     bands: list[Stretch] = []
-    for (low, high, _), holds in zip(cells, inside, strict=True):
+    for (low, high, _), holds in zip(cells, is_inside, strict=True):
         if holds and bands and bands[-1][1] == low:
             bands[-1] = (bands[-1][0], high)
         elif holds:

@@ -34,8 +34,8 @@ def simulate_noise(A: Array, x: Array, force: Array, step: float, count: int, se
     """
     n = len(A)
     halvings = max(0, math.ceil(math.log2(np.linalg.norm(A, 2) * step + 1e-300)))
-    whole = np.block([[-A, np.outer(force, force)], [np.zeros((n, n)), A.T]])
-    power = expm(whole * (step / 2**halvings))
+    matrix = np.block([[-A, np.outer(force, force)], [np.zeros((n, n)), A.T]])
+    power = expm(matrix * (step / 2**halvings))
     forward = power[n:, n:].T
     covariance = forward @ power[:n, n:]
     for _ in range(halvings):

@@ -142,14 +142,16 @@ def growth(
     is_open, is_polynomial = speed and end is None, True
     try:
         a = coefficients_over(design.problem.posed, parameter_set, parameters, name)
-        crossed = find_crossings(a, low, math.inf if is_open else high)
+        crossings = find_crossings(a, low, math.inf if is_open else high)
     except InputError:
         is_open = is_polynomial = False
-        crossed = Crossings(tuple(_find_stability_changes(coefficients, np.linspace(low, high, _GRID_POINTS))), (), ())
-    crossed = user_crossings(model, crossed)
+        crossings = Crossings(
+            tuple(_find_stability_changes(coefficients, np.linspace(low, high, _GRID_POINTS))), (), ()
+        )
+    crossings = user_crossings(model, crossings)
     if is_open:
-        high = _last_event(crossed.found, at)
-    events = tuple(c for c in crossed.found if low < c.at < high)
+        high = _last_event(crossings.found, at)
+    events = tuple(c for c in crossings.found if low < c.at < high)
     centres = [at, *(c.at for c in events if "EP" in c.kind)]
     first = low + (high - low) / _GRID_POINTS if speed else low  # at rest a speed leaves roots 0
     grid = np.unique(
@@ -162,29 +164,32 @@ def growth(
     values, c = values[finite], c[finite]
     root_values = roots(c)
     if is_polynomial:
-        stable, heavily_damped = _clip_bands(crossed.stable, low, high), _clip_bands(crossed.heavily_damped, low, high)
+        stable, heavily_damped = (
+            _clip_bands(crossings.stable, low, high),
+            _clip_bands(crossings.heavily_damped, low, high),
+        )
     else:
-        inside = is_stable(c)
-        stable = tuple(_find_runs(values, inside, events))
-        heavily_damped = tuple(_find_runs(values, inside & np.all(root_values.imag == 0, axis=-1), ()))
+        is_inside = is_stable(c)
+        stable = tuple(_find_runs(values, is_inside, events))
+        heavily_damped = tuple(_find_runs(values, is_inside & np.all(root_values.imag == 0, axis=-1), ()))
     rate = (
         None
         if parameter_set.rate is None
         else np.zeros(values.shape) + parameter_set.rate({**parameters, name: values})
     )
-    many = [c.at for c in events if _has_many_roots(c.kind)] + [at] * _has_many_roots(design.structure)
-    followed = follow_modes(
+    multiple_meetings = [c.at for c in events if _has_many_roots(c.kind)] + [at] * _has_many_roots(design.structure)
+    modes = follow_modes(
         values,
         root_values,
         at,
-        many,
+        multiple_meetings,
         is_bicycle=is_bicycle(model) and model.degree == _BICYCLE_DEGREE,
         over_speed=speed,
     )
     if model.carrier is not None:
         root_values = user_root_array(model, root_values)
-        followed = tuple(
-            replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * model.carrier) for m in followed
+        modes = tuple(
+            replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * model.carrier) for m in modes
         )
     return Growth(
         parameter_set[name],
@@ -196,7 +201,7 @@ def growth(
         stable,
         heavily_damped,
         design.problem,
-        followed,
+        modes,
         events,
         rate,
         tuple(r for r in design.roots if r.multiplicity > 1),
@@ -228,10 +233,10 @@ def _default_range(design: Solution, name: str, end: float | None, at: float) ->
 
 def _last_event(crossings: Sequence[Crossing], at: float) -> float:
     """The end of a range of speeds that shows all events."""
-    crossed = max((c.at for c in crossings if c.kind in ("weave", "capsize", "infinity")), default=0.0)
-    near = _FAR_RATIO * max(at, crossed, 0.5)
-    last = max((c.at for c in crossings if c.at <= near), default=0.0)
-    return _END_RATIO * max(last, crossed, at) if last else 2 * max(at, 0.5)
+    last_crossing = max((c.at for c in crossings if c.kind in ("weave", "capsize", "infinity")), default=0.0)
+    shown_end = _FAR_RATIO * max(at, last_crossing, 0.5)
+    last = max((c.at for c in crossings if c.at <= shown_end), default=0.0)
+    return _END_RATIO * max(last, last_crossing, at) if last else 2 * max(at, 0.5)
 
 
 def _clip_bands(bands: Sequence[Stretch], low: float, high: float) -> tuple[Stretch, ...]:
@@ -245,12 +250,12 @@ def _has_many_roots(structure: str) -> bool:
 
 def _find_stability_changes(coefficients: Callable[[Array], Array], grid: Array) -> Iterator[Crossing]:
     """Changes of stability between points of a grid, by bisection."""
-    inside = is_stable(coefficients(grid))
-    k = np.flatnonzero(inside[1:] != inside[:-1])
+    is_inside = is_stable(coefficients(grid))
+    k = np.flatnonzero(is_inside[1:] != is_inside[:-1])
     low, high = grid[k], grid[k + 1]
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        on_low_side = is_stable(coefficients(middle)) == inside[k]
+        on_low_side = is_stable(coefficients(middle)) == is_inside[k]
         low, high = np.where(on_low_side, middle, low), np.where(on_low_side, high, middle)
     for at, a in zip(high.tolist(), coefficients(high), strict=True):
         if np.all(np.isfinite(a)) and a[0] != 0:  # nothing crosses the axis at a pole or with a root at infinity
@@ -258,11 +263,11 @@ def _find_stability_changes(coefficients: Callable[[Array], Array], grid: Array)
             yield Crossing(at, "weave" if omega else "capsize", Root(0.0, omega), rightmost=True, changes=True)
 
 
-def _find_runs(values: Array, inside: Truth, events: Sequence[Crossing]) -> Iterator[Stretch]:
+def _find_runs(values: Array, is_inside: Truth, events: Sequence[Crossing]) -> Iterator[Stretch]:
     """First and last value of each run of points inside, extended to an event before the next point outside."""
-    changes = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
+    changes = np.flatnonzero(np.diff(is_inside.astype(int), prepend=0, append=0))
     padded = np.concatenate([values[:1], values, values[-1:]])
     for k, m in changes.reshape(-1, 2):
-        begin = [c.at for c in events if padded[k] <= c.at <= values[k]]
-        end = [c.at for c in events if values[m - 1] <= c.at <= padded[m + 1]]
-        yield float(max(begin, default=values[k])), float(min(end, default=values[m - 1]))
+        begins = [c.at for c in events if padded[k] <= c.at <= values[k]]
+        ends = [c.at for c in events if values[m - 1] <= c.at <= padded[m + 1]]
+        yield float(max(begins, default=values[k])), float(min(ends, default=values[m - 1]))

@@ -101,10 +101,10 @@ class _Output:
         """Time and value of the largest sign · c x, at a point of the grid or at an exact extremum."""
         motion, turns = self.motion, self.turns[self.motion.times[self.turns + 1] > since]
         values = sign * np.where(motion.times >= since, self.values, 0.0)
-        best = int(np.argmax(values))
-        extremes = [(float(motion.times[best]), sign * float(values[best]))]
-        near = np.maximum(values[turns], values[turns + 1]) >= _NEAR_PEAK * values[best]
-        extremes += [self.find_turn(k) for k in turns[near] if values[best] > 0]
+        best_row = int(np.argmax(values))
+        extremes = [(float(motion.times[best_row]), sign * float(values[best_row]))]
+        is_near = np.maximum(values[turns], values[turns + 1]) >= _NEAR_PEAK * values[best_row]
+        extremes += [self.find_turn(k) for k in turns[is_near] if values[best_row] > 0]
         return max(extremes, key=lambda each: sign * each[1])
 
     def find_turn(self, k: int) -> tuple[float, float]:

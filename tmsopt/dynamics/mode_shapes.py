@@ -110,7 +110,7 @@ def _or_one(sizes: Any) -> Any:
 def _amplitudes(vector: Complex) -> tuple[list[float], list[float]]:
     """Amplitudes and phases; the first coordinate that moves has phase 0."""
     sizes = np.abs(vector) / np.abs(vector).max()
-    moving = sizes > _ZERO_AMPLITUDE
-    turned = vector / vector[int(np.argmax(moving))]
-    clean = np.where(np.abs(turned.imag) > _ZERO_AMPLITUDE * np.abs(turned), turned, turned.real)
-    return np.where(moving, sizes, 0.0).tolist(), np.where(moving, np.degrees(np.angle(clean)), np.nan).tolist()
+    is_moving = sizes > _ZERO_AMPLITUDE
+    rotated = vector / vector[int(np.argmax(is_moving))]
+    rounded = np.where(np.abs(rotated.imag) > _ZERO_AMPLITUDE * np.abs(rotated), rotated, rotated.real)
+    return np.where(is_moving, sizes, 0.0).tolist(), np.where(is_moving, np.degrees(np.angle(rounded)), np.nan).tolist()

@@ -64,9 +64,13 @@ def follow_modes(
     parts = _split_pieces(values, roots, multiple_meetings)
     if not parts:
         return ()
-    typical = [k for k, part in enumerate(parts) if is_bicycle and part.roots.shape[1] == 3 and part.real == 2]
-    nearest = min(range(len(parts)), key=lambda k: (np.abs(parts[k].values - design).min(), -len(parts[k].values)))
-    first = nearest if not typical or (not over_speed and nearest in typical) else typical[-1]
+    typical_pieces = [k for k, part in enumerate(parts) if is_bicycle and part.roots.shape[1] == 3 and part.real == 2]
+    design_piece = min(range(len(parts)), key=lambda k: (np.abs(parts[k].values - design).min(), -len(parts[k].values)))
+    first = (
+        design_piece
+        if not typical_pieces or (not over_speed and design_piece in typical_pieces)
+        else typical_pieces[-1]
+    )
     names = {first: _name_modes(parts[first], design, is_bicycle)}
     for order in (range(first, len(parts)), range(first, -1, -1)):
         for previous, k in pairwise(order):
@@ -87,9 +91,9 @@ def _split_pieces(values: Array, roots: Complex, multiple_meetings: Sequence[flo
     for rows in np.split(np.arange(len(values)), cuts):
         if len(rows) < _MIN_POINTS or np.ptp(values[rows]) < _MIN_SHARE * np.ptp(values):
             continue
-        inside, count = roots[rows], int(real[rows[0]])
-        reals = np.sort(inside.real[inside.imag == 0].reshape(len(rows), count), axis=1)
-        pairs = np.sort_complex(inside[inside.imag > 0].reshape(len(rows), -1))
+        piece_roots, count = roots[rows], int(real[rows[0]])
+        reals = np.sort(piece_roots.real[piece_roots.imag == 0].reshape(len(rows), count), axis=1)
+        pairs = np.sort_complex(piece_roots[piece_roots.imag > 0].reshape(len(rows), -1))
         for k in range(1, len(rows)) if pairs.shape[1] > 1 else ():
             predicted = 2 * pairs[k - 1] - pairs[k - 2] if k > 1 else pairs[k - 1]
             pairs[k] = pairs[k][_match(predicted, pairs[k])]
@@ -121,14 +125,14 @@ def _name_modes(part: _Piece, design: float, is_bicycle: bool) -> list[str]:
     return [f"real {count - k}" for k in range(count)] + [f"pair {k}" for k in rank]
 
 
-def _pass_names(old: _Piece, names: list[str], new: _Piece, forward: bool) -> list[str]:
+def _pass_names(old_piece: _Piece, names: list[str], new_piece: _Piece, forward: bool) -> list[str]:
     """Names of the next piece, from those of the previous one, if just two roots meet between them; else empty."""
-    if abs(old.real - new.real) != 2:
+    if abs(old_piece.real - new_piece.real) != 2:
         return []
-    many, few = (old, new) if old.real > new.real else (new, old)  # real roots
-    r, p = (part.roots[-1 if (part is old) == forward else 0] for part in (many, few))
-    i = int(np.diff(r[: many.real].real).argmin())  # real roots i and i + 1 form the pair j
-    j = few.real + int(p[few.real :].imag.argmin())
+    few_reals, many_reals = sorted((old_piece, new_piece), key=lambda piece: piece.real)
+    r, p = (part.roots[-1 if (part is old_piece) == forward else 0] for part in (many_reals, few_reals))
+    i = int(np.diff(r[: many_reals.real].real).argmin())  # real roots i and i + 1 form the pair j
+    j = few_reals.real + int(p[few_reals.real :].imag.argmin())
     other_reals, other_roots = np.delete(np.arange(len(r)), [i, i + 1]), np.delete(np.arange(len(p)), j)
     distances = [
         np.abs(x - y).min(initial=np.inf)
@@ -136,12 +140,12 @@ def _pass_names(old: _Piece, names: list[str], new: _Piece, forward: bool) -> li
     ]
     if abs(r[i + 1] - r[i]) > _ISOLATED_RATIO * distances[0] or 2 * p[j].imag > _ISOLATED_RATIO * distances[1]:
         return []
-    other_roots[few.real :] = other_roots[few.real :][
-        _match(r[other_reals[few.real :]], p[other_roots[few.real :]])
+    other_roots[few_reals.real :] = other_roots[few_reals.real :][
+        _match(r[other_reals[few_reals.real :]], p[other_roots[few_reals.real :]])
     ]  # real ones stay in order
-    if many is old:
-        both = names[i] if names[i] == names[i + 1] else f"{names[i + 1]} + {names[i]}"
-        new_names = {j: both} | {b: names[a] for a, b in zip(other_reals, other_roots, strict=True)}
+    if many_reals is old_piece:
+        pair_name = names[i] if names[i] == names[i + 1] else f"{names[i + 1]} + {names[i]}"
+        new_names = {j: pair_name} | {b: names[a] for a, b in zip(other_reals, other_roots, strict=True)}
     else:
         upper, _, lower = names[j].partition(" + ")
         new_names = {i: lower or upper, i + 1: upper} | {

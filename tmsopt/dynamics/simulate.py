@@ -166,10 +166,10 @@ def simulate(
 
     More: docs/how_to/motion.md
     """
-    arguments, whole = locals(), pose(design)
-    problem = whole.nominal
+    arguments, posed = locals(), pose(design)
+    problem = posed.nominal
     matrices_of(problem.model)
-    parameters = problem.ordered(parameters_of(design, whole, "", progress)) | dict(at or {})
+    parameters = problem.ordered(parameters_of(design, posed, "", progress)) | dict(at or {})
     if faults := list(parameter_faults(problem, parameters)):
         raise InputError([replace(f, key=("at", *f.key[-1:])) for f in faults])
     start_steps(progress, "following the motion")

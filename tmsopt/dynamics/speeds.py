@@ -129,8 +129,8 @@ def speeds(
 
     More: docs/explanation/weave_and_capsize.md
     """
-    whole = pose(problem if problem is not None and isinstance(design, Mapping) else design)
-    nominal = whole.nominal
+    posed = pose(problem if problem is not None and isinstance(design, Mapping) else design)
+    nominal = posed.nominal
     parameter_set = nominal.parameter_set
     name = parameter if parameter is not None else speed_of(parameter_set)
     if name is None:
@@ -139,12 +139,12 @@ def speeds(
         raise input_error(message, "parameter")
     if name not in parameter_set.names:
         raise input_error(f"unknown parameter '{name}'; {suggest(name, parameter_set.names)}", "parameter")
-    parameters = parameters_of(design, whole, name, progress)
+    parameters = parameters_of(design, posed, name, progress)
     start_steps(progress, "isolating speeds")
-    allowed = parameter_set[name].range
+    physical_range = parameter_set[name].range
     try:
         lower, upper = map(
-            float, nominal.free.get(name, (allowed.lower, allowed.upper)) if between is None else between
+            float, nominal.free.get(name, (physical_range.lower, physical_range.upper)) if between is None else between
         )
         if not -math.inf < lower < upper:
             raise ValueError
@@ -203,15 +203,15 @@ def _to_fractions(x: Any) -> Any:
     return flint.fmpq_poly([rational(c) for c in x]) if isinstance(x, flint.arb_poly) else rational(x)
 
 
-def parameters_of(design: Any, whole: Posed, name: str, progress: Listener | None) -> dict[str, float]:
+def parameters_of(design: Any, problem: Posed, name: str, progress: Listener | None) -> dict[str, float]:
     """The parameters of the design; a problem with free parameters other than `name` is solved first."""
     if isinstance(design, Solution):
         return dict(design.parameters)
     if isinstance(design, Mapping):
-        parameters = {**whole.fixed, **design}
-        if faults := [f for f in parameter_faults(whole, parameters) if f.key[-1] != name]:
+        parameters = {**problem.fixed, **design}
+        if faults := [f for f in parameter_faults(problem, parameters) if f.key[-1] != name]:
             raise InputError(faults)
         return parameters
-    if set(whole.free) <= {name}:
-        return dict(whole.fixed)
-    return dict(solve(whole, progress=progress, interruptible=False).parameters)
+    if set(problem.free) <= {name}:
+        return dict(problem.fixed)
+    return dict(solve(problem, progress=progress, interruptible=False).parameters)

@@ -93,8 +93,8 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     native = parameter_set.native(parameters)
     pencil = matrices_of(model)(native)
     n = len(pencil[0])
-    scaled = pencil[0] / np.maximum(np.abs(pencil[0]).max(axis=0), 1e-300)
-    if not all(np.isfinite(P).all() for P in pencil) or np.linalg.cond(scaled) > _MAX_CONDITION:
+    scaled_mass = pencil[0] / np.maximum(np.abs(pencil[0]).max(axis=0), 1e-300)
+    if not all(np.isfinite(P).all() for P in pencil) or np.linalg.cond(scaled_mass) > _MAX_CONDITION:
         message = "the mass matrix of this design is singular: a root is at infinity, and there is no motion to show"
         raise input_error(message, "parameters")
     A = -np.linalg.solve(pencil[0], pencil[-1])
@@ -122,10 +122,10 @@ def _bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[s
     names = (*ANGLES, *RATES, *(driven if lagged else ()))
     yaw, yaw_of_rate, v, w, contact_shift = map(float, contact_path(native))
     n = len(names)
-    whole = np.zeros((n + 2, n + 2))
-    whole[:n, :n] = A
-    whole[n, [1, 3]] = yaw, yaw_of_rate
-    whole[n + 1, n] = v
+    matrix = np.zeros((n + 2, n + 2))
+    matrix[:n, :n] = A
+    matrix[n, [1, 3]] = yaw, yaw_of_rate
+    matrix[n + 1, n] = v
     unit = np.eye(n + 2)
     rows = {**dict(zip(names, unit, strict=False)), "psi": unit[n], "y_rear": unit[n + 1]}
     rows["y_front"] = unit[n + 1] + w * unit[n] + contact_shift * unit[1]
@@ -143,7 +143,7 @@ def _bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[s
         (TORQUES, torque, ("m_B g w", "N m")),
         (("x", "y_rear", "y_front"), length, ("w", "m")),
     )
-    unit_sizes = {name: size for each, size, _ in kinds for name in each}
+    unit_sizes = {name: size for names_of_kind, size, _ in kinds for name in names_of_kind}
     states = np.array([unit_sizes[name] for name in (*names, "psi", "y_rear")])
     impulses = {
         name: rate / torque * states * np.r_[0.0, 0.0, jumps[:, k], np.zeros(n - 2)] for k, name in enumerate(TORQUES)
@@ -151,9 +151,15 @@ def _bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[s
     return System(
         names,
         ANGLES,
-        rate * states[:, None] * whole / states,
+        rate * states[:, None] * matrix / states,
         Table({name: unit_sizes[name] * row / states for name, row in rows.items()}),
         Table(impulses),
         v * rate * length,
-        Table({name: either[parameter_set.rate is not None] for each, _, either in kinds for name in each}),
+        Table(
+            {
+                name: either[parameter_set.rate is not None]
+                for names_of_kind, _, either in kinds
+                for name in names_of_kind
+            }
+        ),
     )

@@ -104,9 +104,9 @@ def _largest_product(problem: Posed) -> float:
     box, exact_ends = _algebraic_box(problem)
     outer = _outer_coefficients(model, tuple(box))
     shares = np.random.default_rng(0).random(len(box)).tolist()  # a generic point, where no power vanishes
-    inside = [lo + (hi - lo) * share for (lo, hi), share in zip(box.values(), shares, strict=True)]
+    inner_point = [lo + (hi - lo) * share for (lo, hi), share in zip(box.values(), shares, strict=True)]
     try:
-        through = {n: _restrict_to_line(outer, inside, n) for n, (lo, hi) in box.items() if lo < hi}
+        through = {n: _restrict_to_line(outer, inner_point, n) for n, (lo, hi) in box.items() if lo < hi}
     except (DomainError, TypeError):  # division by a parameter, or by 0 for the fixed ones
         return _enclosed_product(problem)
     varying = {n: max(a.degree() for a in ends) for n, (*ends, turning) in through.items() if turning}
@@ -150,11 +150,11 @@ def _largest_ratio(outer: Formula, points: Mapping[str, Array], exact_ends: Exac
     again in interval arithmetic, because in doubles a small a0 loses digits by cancellation.
     """
     first, last, *_ = np.broadcast_arrays(*values(outer, points), *points.values())
-    both = (last == 0) & (first == 0)
-    if set(np.sign(first[~both]).tolist()) not in ({-1.0}, {1.0}):
+    are_zero = (last == 0) & (first == 0)
+    if set(np.sign(first[~are_zero]).tolist()) not in ({-1.0}, {1.0}):
         return math.inf
     with np.errstate(over="ignore"):
-        quotients = np.where(both, 0.0, np.abs(last / np.where(both, 1.0, first)))
+        quotients = np.where(are_zero, 0.0, np.abs(last / np.where(are_zero, 1.0, first)))
     with flint.ctx.workprec(_BITS):
         for k in np.flatnonzero(quotients >= quotients.max() / 2):
             at = {n: float(column[k]) for n, column in points.items()}
@@ -172,13 +172,13 @@ def _restrict_to_line(outer: Formula, point: Sequence[float], name: str) -> tupl
 def _extremes_along(outer: Formula, corner: Sequence[float], name: str, *ends: float) -> list[tuple[float, ...]]:
     """The ends and stationary points along the nonlinear parameter from a corner; empty if there is a pole."""
     first, _, turning = _restrict_to_line(outer, corner, name)
-    poles, inside = (
+    poles, turning_points = (
         [z.real for z, _ in p.complex_roots() if z.imag == 0 and not (z.real < ends[0] or z.real > ends[1])]
         for p in (first, turning)
     )
     if poles:
         return []
-    places = (*ends, *(min(max(float(x), ends[0]), ends[1]) for x in inside))
+    places = (*ends, *(min(max(float(x), ends[0]), ends[1]) for x in turning_points))
     return [tuple(x if n == name else c for n, c in zip(outer.names, corner, strict=True)) for x in places]
 
 

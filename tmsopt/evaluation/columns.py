@@ -68,8 +68,8 @@ def can_evaluate_columns(problem: Posed) -> bool:
     The problem may not have free parameters, cases, a pattern or a complex model. It may not use the robustness radius
     or the angular frequency.
     """
-    listed = problem.free or problem.scenarios or problem.tolerances or problem.model.carrier is not None
-    return not (listed or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
+    excluded = problem.free or problem.scenarios or problem.tolerances or problem.model.carrier is not None
+    return not (excluded or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
 
 
 def evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Columns | None:
@@ -87,11 +87,12 @@ def evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Sequ
 
 
 def _evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]) -> Columns:
-    fixed = {n: np.float64(x) for n, x in problem.ordered({}).items()}  # comparisons of NumPy numbers give arrays
-    parameters = fixed | dict(columns)
+    # comparisons of NumPy numbers give arrays
+    fixed_numbers = {n: np.float64(x) for n, x in problem.ordered({}).items()}
+    parameters = fixed_numbers | dict(columns)
     m = len(next(iter(columns.values())))
-    wide = {n: Bounded(x, np.abs(x) * _UNIT_ROUNDING) for n, x in parameters.items()}
-    coefficients = [_broadcast(c, m) for c in coefficients_of(problem, wide)]
+    bounded = {n: Bounded(x, np.abs(x) * _UNIT_ROUNDING) for n, x in parameters.items()}
+    coefficients = [_broadcast(c, m) for c in coefficients_of(problem, bounded)]
     motions = enclose_motions(coefficients, STRUCTURE_TOLERANCE)
     certain = motions.simple & _is_possible(problem, parameters)
 
@@ -101,11 +102,11 @@ def _evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Seq
         certain = certain & (spread.is_known_within(KNOWN) | ((spread.value == 0) & (spread.error == 0)))
         return np.asarray(spread.value)
 
-    wide |= {"abscissa": motions.abscissa, "damping_ratio": motions.damping_ratio}
+    bounded |= {"abscissa": motions.abscissa, "damping_ratio": motions.damping_ratio}
     objective = (
-        round_or_doubt(*evaluate(problem, [problem.objective], wide)) if problem.objective else np.full(m, np.nan)
+        round_or_doubt(*evaluate(problem, [problem.objective], bounded)) if problem.objective else np.full(m, np.nan)
     )
-    doubles = {name: round_or_doubt(wide[name]) for name in ("abscissa", "damping_ratio")}
+    doubles = {name: round_or_doubt(bounded[name]) for name in ("abscissa", "damping_ratio")}
     plain = parameters | doubles | {ANGULAR_FREQUENCY: motions.frequency}
     violations, doubt = _find_violations(problem, plain, motions)
     certain &= ~doubt & (np.abs(doubles["abscissa"]) > motions.scatter)
@@ -113,7 +114,7 @@ def _evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Seq
     bound, related = _find_bounds(problem, coefficients, round_or_doubt)
     bound = np.where(feasible, bound, -np.inf)
     certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT_RATIO * PROVEN * (1.0 + np.abs(bound))))
-    residuals = _law_residuals(problem, wide, coefficients, feasible, round_or_doubt) if problem.model is tms else {}
+    residuals = _law_residuals(problem, bounded, coefficients, feasible, round_or_doubt) if problem.model is tms else {}
     return Columns(
         certain,
         objective,
@@ -131,21 +132,25 @@ def _evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Seq
 
 def _broadcast(number: Any, m: int) -> Bounded:
     """A number as a column with one value per design."""
-    wide = as_bounded(number)
-    return Bounded(*(np.ascontiguousarray(np.broadcast_to(x, m), dtype=float) for x in (wide.value, wide.error)))
+    bounded = as_bounded(number)
+    return Bounded(*(np.ascontiguousarray(np.broadcast_to(x, m), dtype=float) for x in (bounded.value, bounded.error)))
 
 
 def _is_possible(problem: Posed, parameters: Mapping[str, Any]) -> Truth:
     """Whether each design is valid: its parameters are in their ranges, and no angle is 0, as bounds require."""
     parameter_set, possible = problem.parameter_set, np.True_
     for p in parameter_set.parameters:
-        x, inside = parameters[p.name], p.range
-        low, high = (x >= inside.lower, x <= inside.upper) if inside.closed else (x > inside.lower, x < inside.upper)
+        x, allowed_range = parameters[p.name], p.range
+        above_lower, below_upper = (
+            (x >= allowed_range.lower, x <= allowed_range.upper)
+            if allowed_range.closed
+            else (x > allowed_range.lower, x < allowed_range.upper)
+        )
         size = np.abs(x)
-        possible = possible & low & high & (((size >= SMALLEST) & (size <= 1 / SMALLEST)) | (x == 0))
+        possible = possible & above_lower & below_upper & (((size >= SMALLEST) & (size <= 1 / SMALLEST)) | (x == 0))
         possible = possible & ~(p.tangent & (x == 0))
-    for name, (needed, _) in parameter_set.needs.items():
-        possible = possible & ((parameters[name] == 0) | (parameters[needed] > 0))
+    for name, (needed_name, _) in parameter_set.needs.items():
+        possible = possible & ((parameters[name] == 0) | (parameters[needed_name] > 0))
     return np.asarray(possible)
 
 
@@ -201,7 +206,7 @@ def _find_bounds(
 
 def _law_residuals(
     problem: Posed,
-    wide: Mapping[str, Any],
+    bounded: Mapping[str, Any],
     coefficients: Sequence[Bounded],
     feasible: Truth,
     round_or_doubt: Callable[[Any], Array],
@@ -209,7 +214,7 @@ def _law_residuals(
     """Relative residuals of the laws that apply to a feasible design without a multiple root; see `law_rows`."""
     m = len(feasible)
     names = problem.model.sets[0].names
-    *native, number = (_broadcast(x, m) for x in evaluate(problem, [*names, "Fr_c"], wide))
+    *native, number = (_broadcast(x, m) for x in evaluate(problem, [*names, "Fr_c"], bounded))
     p = {n: round_or_doubt(x) for n, x in zip(names, native, strict=True)}
     exists = np.isfinite(number.value)
     critical = np.where(exists, round_or_doubt(number.where(exists, Bounded(np.ones(m), np.zeros(m)))), np.nan)

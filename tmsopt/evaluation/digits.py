@@ -67,8 +67,8 @@ def certified_numbers(
     structures = {checked.worst: checked.structure}
     for case in {checked.least_damped, checked.fastest} - {checked.worst}:
         structures[case] = problem.values(case.applied(parameters))["structure"]
-    listed = [case for case in cases if not case.direction]
-    design = _Design(problem, _exact_numbers(parameters), checked, listed, structures)
+    stated_cases = [case for case in cases if not case.direction]
+    design = _Design(problem, _exact_numbers(parameters), checked, stated_cases, structures)
     default_numbers: dict[_Key, float] = {("value", ""): checked.objective, ("realised", ""): checked.realised}
     default_numbers["abscissa", ""] = checked.structure.abscissa
     default_numbers |= {("quantities", name): x for name, x in checked.quantities.items()}
@@ -164,8 +164,8 @@ class _Design:
         if objective is not None and set(objective.names) & {*ROOT_NAMES} <= set(known_values):
             differs = depends_on_case(self.problem, objective, self.cases)
             cases = self.cases if differs else [Case()]
-            each = [objective.of(self.values(case).with_known(known_values), BALLS) for case in cases]
-            yield ("value", ""), reduce(lesser if self.problem.sense == "maximize" else greater, each), 0
+            objectives = [objective.of(self.values(case).with_known(known_values), BALLS) for case in cases]
+            yield ("value", ""), reduce(lesser if self.problem.sense == "maximize" else greater, objectives), 0
 
     def roots(self, last: bool) -> tuple[_Several, Mapping[Case, _Several]] | None:
         """The stored roots in the worst case, and for each case the roots of the nearest polynomial of its structure.

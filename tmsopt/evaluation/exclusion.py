@@ -41,9 +41,9 @@ def _is_box_excluded(problem: Posed) -> bool:
     if any(low > high + _MARGIN * max(1.0, abs(low), abs(high)) for low, high in free.values()):
         return True
     box = {n: (min(ends), max(ends)) for n, ends in free.items()}
-    inside = {n: ends for n, ends in box.items() if ends[0] < ends[1]}
-    fixed = {**problem.fixed, **{n: ends[0] for n, ends in box.items() if n not in inside}}
-    build = Builder(problem.derive(free=inside, fixed=fixed, start={}), problem.cases[:1])
+    free_ranges = {n: ends for n, ends in box.items() if ends[0] < ends[1]}
+    fixed = {**problem.fixed, **{n: ends[0] for n, ends in box.items() if n not in free_ranges}}
+    build = Builder(problem.derive(free=free_ranges, fixed=fixed, start={}), problem.cases[:1])
     build.add_constraints(without=problem.asked_of_roots)
     if not build.rows:
         return False

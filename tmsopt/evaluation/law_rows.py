@@ -171,7 +171,7 @@ def _heights(p: Mapping[str, Any], *names: str) -> dict[str, Any]:
 
 def _why_not_ep4(design: Solution) -> str:
     binding = ", ".join(design.active)
-    why = f" because {binding} bind{'s' if len(design.active) == 1 else ''}" if binding else ""
+    reason = f" because {binding} bind{'s' if len(design.active) == 1 else ''}" if binding else ""
     if not design.problem.free:
-        why = " and nothing is free"
-    return f"the structure is '{design.structure}'{why}"
+        reason = " and nothing is free"
+    return f"the structure is '{design.structure}'{reason}"

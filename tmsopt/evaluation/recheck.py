@@ -73,10 +73,10 @@ def recheck(
     """
     evaluated = _evaluate_cases(problem, parameters, problem.cases if cases is None else cases, robustness)
     violations, amounts = evaluated.violations(problem.conditions)
-    nominal, top, crossing = evaluated.nominal, evaluated.worst["abscissa"], False
-    structure = evaluated.each[top]["structure"]
+    nominal, worst_index, crossing = evaluated.nominal, evaluated.worst["abscissa"], False
+    structure = evaluated.each[worst_index]["structure"]
     if not math.isfinite(structure.abscissa):
-        exist = all(math.isfinite(float(c)) for c in evaluated.each[top].coefficients)
+        exist = all(math.isfinite(float(c)) for c in evaluated.each[worst_index].coefficients)
         violations["a0" if exist else "coefficients"] = 1.0  # a singular mass matrix, or undefined
     if problem.pattern is not None:
         a = [float(c) for c in nominal.coefficients]
@@ -96,15 +96,15 @@ def recheck(
         nominal = nominal.with_known({"abscissa": structure.abscissa, "structure": structure})
     return Evaluation(
         structure=structure,
-        realised=realised_abscissa(problem, evaluated.cases[top].applied(parameters)),
+        realised=realised_abscissa(problem, evaluated.cases[worst_index].applied(parameters)),
         objective=evaluated.objective,
         violations=Table(violations),
         amounts=Table(violations | amounts),
         quantities=Table({name: float(nominal[name]) for name in names}),
         dimensionless=Table({n: float(v) for n, v in parameter_set.native(parameters).items()}),
-        worst=evaluated.cases[top],
+        worst=evaluated.cases[worst_index],
         least_damped=evaluated.cases[evaluated.worst["damping_ratio"]],
-        fastest=evaluated.cases[evaluated.worst.get(ANGULAR_FREQUENCY, top)],
+        fastest=evaluated.cases[evaluated.worst.get(ANGULAR_FREQUENCY, worst_index)],
         robustness=evaluated.robustness,
         crossing=crossing,
     )
@@ -122,9 +122,11 @@ def find_missed_limits(
     if not conditions:
         return {}
     evaluated = _evaluate_cases(problem, parameters, cases, robustness)
-    near = {n: c for n, c in conditions.items() if any(_may_be_missed(c, v) for v in evaluated.relevant_cases(c))}
-    exactly = _evaluate_cases(problem, parameters, cases, evaluated.robustness, parameters) if near else evaluated
-    return exactly.violations(near)[1]
+    doubtful = {n: c for n, c in conditions.items() if any(_may_be_missed(c, v) for v in evaluated.relevant_cases(c))}
+    exact_values = (
+        _evaluate_cases(problem, parameters, cases, evaluated.robustness, parameters) if doubtful else evaluated
+    )
+    return exact_values.violations(doubtful)[1]
 
 
 def recheck_exactly(
@@ -242,17 +244,17 @@ def _evaluate_cases(
     stored: Mapping[str, Any] | None = None,
 ) -> _CaseValues:
     """Evaluate a design in its cases, with roots of its structure or exact roots of the `stored` parameters."""
-    listed = [case for case in cases if not case.direction] or [Case()]
+    stated_cases = [case for case in cases if not case.direction] or [Case()]
 
     @cache
     def values(case: Case) -> Values:
         case_values = problem.values(case.applied(parameters))
         if stored is None:
             return case_values
-        exactly = roots_at(problem.model, problem.parameter_set, case.applied(stored))
-        return case_values.with_known({"structure": Structure("undecided", exactly, 0.0)})
+        exact_roots = roots_at(problem.model, problem.parameter_set, case.applied(stored))
+        return case_values.with_known({"structure": Structure("undecided", exact_roots, 0.0)})
 
-    nominal, *each = map(values, (Case(), *listed))
+    nominal, *each = map(values, (Case(), *stated_cases))
     worst = {
         name: max(range(len(each)), key=lambda k: _nan_as_infinite(sign * each[k][name]))
         for name, sign in WORSE_DIRECTION.items()
@@ -264,7 +266,7 @@ def _evaluate_cases(
     if robustness is not None:
         shared[RADIUS] = robustness.radius
     nominal, *each = (v.with_known({"structure": v["structure"], **shared}) for v in (nominal, *each))
-    return _CaseValues(problem, listed, nominal, each, worst, robustness)
+    return _CaseValues(problem, stated_cases, nominal, each, worst, robustness)
 
 
 def _nan_as_infinite(value: float) -> float:

@@ -60,13 +60,13 @@ class _Cluster:
     Attributes:
         case: the case that has it.
         root: the root of the ideal design, on or above the real axis.
-        along: unit vector along the limit; the feasible side is on its left.
-        exactly: whether the limit is an equality.
+        direction: unit vector along the limit; the feasible side is on its left.
+        equality: whether the limit is an equality.
     """
 
     case: Case
     root: Root
-    along: complex
+    direction: complex
     equality: bool
 
     @property
@@ -77,7 +77,7 @@ class _Cluster:
         """For the parts of each cₖ that are neither 0 by symmetry nor free to change: k, and whether it is real."""
         for k in range(1, self.root.multiplicity + 1):
             for real in (True, False):
-                if (k > 1 or not real) and (self.root.im or real == (k % 2 == 0 or self.along.imag == 0)):
+                if (k > 1 or not real) and (self.root.im or real == (k % 2 == 0 or self.direction.imag == 0)):
                     yield k, real
 
 
@@ -98,24 +98,26 @@ def find_storable_design(
     if amounts:
         clusters = _clusters(problem, parameters, checked, cases, list(amounts))
         ends = problem.free.items()
-        inside = [n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _END_DISTANCE * (hi - lo)]
-        groups = [names for names in dict.fromkeys((tuple(inside), tuple(problem.free))) if names and clusters]
-        ways = (
+        inner_names = [
+            n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _END_DISTANCE * (hi - lo)
+        ]
+        groups = [names for names in dict.fromkeys((tuple(inner_names), tuple(problem.free))) if names and clusters]
+        attempts = (
             _SpreadRoots(problem, parameters, clusters, *way) for way in itertools.product(groups, _SPREADS.tolist())
         )
-        designs: Iterator[dict[str, float]] = (design for way in ways for design in way.designs())
+        designs: Iterator[dict[str, float]] = (design for way in attempts for design in way.designs())
     else:  # move one free parameter by a few units in the last place
-        near = (
+        near_designs = (
             {**parameters, name: x}
             for steps, (name, (lower, upper)) in itertools.product(_ROUNDINGS, problem.free.items())
             if lower <= (x := parameters[name] + steps * math.ulp(parameters[name])) <= upper
         )
-        designs = (design for design in near if _has_objective(problem, design))
+        designs = (design for design in near_designs if _has_objective(problem, design))
     for design in designs:
         if not find_missed_limits(problem, design, cases, checked.robustness):
-            again = recheck(problem, design, cases, checked.robustness)
-            if set(again.violations) <= set(problem.asked_of_roots):
-                return design, _keep_structure(problem, design, checked, again), {}
+            new_check = recheck(problem, design, cases, checked.robustness)
+            if set(new_check.violations) <= set(problem.asked_of_roots):
+                return design, _keep_structure(problem, design, checked, new_check), {}
     return parameters, checked, amounts
 
 
@@ -148,8 +150,12 @@ def abscissa_as_stored(solution: Solution) -> str:
 
 def missed_note(problem: Posed, amounts: Numbers) -> tuple[str, ...]:
     """A sentence on the limits that the stored parameters miss; empty if they miss no limit."""
-    why = "no doubles nearby that satisfy every limit were found" if problem.free else "the ideal design satisfies them"
-    return (f"rounded to doubles, the parameters violate {amounts_text(problem, amounts)}; {why}",) if amounts else ()
+    reason = (
+        "no doubles nearby that satisfy every limit were found" if problem.free else "the ideal design satisfies them"
+    )
+    return (
+        (f"rounded to doubles, the parameters violate {amounts_text(problem, amounts)}; {reason}",) if amounts else ()
+    )
 
 
 def _clusters(
@@ -161,7 +167,7 @@ def _clusters(
 ) -> list[_Cluster]:
     """The multiple roots that lie on the named limits."""
     limited_names = {name for limit in names for name in problem.conditions[limit].names}
-    exactly = any(problem.conditions[limit].equality for limit in names)
+    is_equality = any(problem.conditions[limit].equality for limit in names)
     clusters = []
     for case in [case for case in cases if not case.direction] or [Case()]:
         structure = problem.values(case.applied(parameters))["structure"]
@@ -170,13 +176,13 @@ def _clusters(
             z = complex(root.re, root.im)
             if root.multiplicity == 1 or root.im < 0 or z == 0:
                 continue
-            fast = ANGULAR_FREQUENCY in limited_names and root.im >= checked.quantities[ANGULAR_FREQUENCY] - size
-            undamped = "damping_ratio" in limited_names and -root.re <= (
+            is_fast = ANGULAR_FREQUENCY in limited_names and root.im >= checked.quantities[ANGULAR_FREQUENCY] - size
+            is_undamped = "damping_ratio" in limited_names and -root.re <= (
                 checked.quantities["damping_ratio"] + _SAME_LINE
             ) * abs(z)
-            if fast or undamped or root.re >= checked.structure.abscissa - size:
-                direction = -1.0 if fast else z / abs(z) if undamped else 1j
-                clusters.append(_Cluster(case, root, direction, exactly))
+            if is_fast or is_undamped or root.re >= checked.structure.abscissa - size:
+                direction = -1.0 if is_fast else z / abs(z) if is_undamped else 1j
+                clusters.append(_Cluster(case, root, direction, is_equality))
     return clusters
 
 
@@ -202,9 +208,9 @@ class _SpreadRoots:
         for cluster in self.clusters:
             m, size = cluster.root.multiplicity, abs(cluster.place)
             h = size * math.sqrt(self.spread * math.comb(m, 2))
-            inside = 0.0 if cluster.equality else size * self.spread
-            c = np.poly(h * np.linspace(-1, 1, m) + 1j * inside)
-            width = (FEASIBLE * size + inside) / 2
+            inner_distance = 0.0 if cluster.equality else size * self.spread
+            c = np.poly(h * np.linspace(-1, 1, m) + 1j * inner_distance)
+            width = (FEASIBLE * size + inner_distance) / 2
             for k, real in cluster.components():
                 leeway = h**k / 8 if real else h ** (k - 1) * width
                 aims.append((c[k].real if real else c[k].imag, leeway, size**k))
@@ -259,7 +265,7 @@ class _SpreadRoots:
             a = self.problem.model.coefficients(cluster.case.applied(at), self.problem.parameter_set)
             if not all(c.is_finite() for c in a):
                 return [flint.arb("nan")] * len(target)
-            place, direction = flint.acb(cluster.place), flint.acb(cluster.along)
+            place, direction = flint.acb(cluster.place), flint.acb(cluster.direction)
             z = sorted((z for z, m in isolated_roots(a) for _ in range(m)), key=lambda z: float(abs(z - place)))
             c = product(*([flint.acb(1), (place - root) / direction] for root in z[: cluster.root.multiplicity]))
             parts += [c[k].real if real else c[k].imag for k, real in cluster.components()]
@@ -268,30 +274,30 @@ class _SpreadRoots:
 
 def _nearest_combinations(rows: Array, residual: Array) -> Iterator[list[int]]:
     """Integer combinations of rows that cancel `residual` best; the best combination comes first."""
-    whole = [[int(math.ldexp(x, _BITS)) for x in row] for row in rows.tolist()]
-    reduced, transform = flint.fmpz_mat(whole).lll(True)
+    integers = [[int(math.ldexp(x, _BITS)) for x in row] for row in rows.tolist()]
+    reduced, transform = flint.fmpz_mat(integers).lll(True)
     n = len(rows)
     basis = np.array([[math.ldexp(int(reduced[i, j]), -_BITS) for j in range(len(residual))] for i in range(n)])
     q, r = np.linalg.qr(basis.T)
-    remainder, nearest = residual, [0] * n
+    remainder, combination = residual, [0] * n
     for i in range(n)[::-1]:
-        nearest[i] = -round(float(q[:, i] @ remainder / r[i, i]))
-        remainder = remainder + nearest[i] * basis[i]
+        combination[i] = -round(float(q[:, i] @ remainder / r[i, i]))
+        remainder = remainder + combination[i] * basis[i]
     neighbours = itertools.product((0, 1, -1), repeat=min(n, _NEIGHBOURS))
     ranked = sorted(neighbours, key=lambda changes: float(np.abs(remainder + changes @ basis[: len(changes)]).max()))
     for changes in ranked[:_TRIALS]:
-        by = [a + b for a, b in itertools.zip_longest(nearest, changes, fillvalue=0)]
+        by = [a + b for a, b in itertools.zip_longest(combination, changes, fillvalue=0)]
         yield [sum(b * int(transform[i, j]) for i, b in enumerate(by)) for j in range(n)]
 
 
-def _keep_structure(problem: Posed, design: Numbers, checked: Evaluation, again: Evaluation) -> Evaluation:
+def _keep_structure(problem: Posed, design: Numbers, checked: Evaluation, new_check: Evaluation) -> Evaluation:
     """The recheck of a moved design, with the structure of the ideal one."""
-    structure = again.structure
+    structure = new_check.structure
     if structure.name != checked.structure.name:
         with flint.ctx.workdps(_DIGITS):
             exact = {n: flint.arb(x) for n, x in checked.worst.applied(design).items()}
             a = problem.model.coefficients(exact, problem.parameter_set)
-            nearest = nearest_roots(a, checked.structure.roots) or ()
-        roots = tuple(Root(float(r.re), float(r.im), r.multiplicity) for r in nearest) or checked.structure.roots
+            exact_roots = nearest_roots(a, checked.structure.roots) or ()
+        roots = tuple(Root(float(r.re), float(r.im), r.multiplicity) for r in exact_roots) or checked.structure.roots
         structure = Structure(checked.structure.name, roots, checked.structure.distance)
-    return replace(again, structure=structure, violations=checked.violations, amounts=checked.amounts)
+    return replace(new_check, structure=structure, violations=checked.violations, amounts=checked.amounts)

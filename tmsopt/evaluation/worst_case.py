@@ -64,20 +64,22 @@ def find_worst_cases(problem: Posed, parameters: Numbers) -> dict[str, Worst]:
         if depends_on_case(problem, condition, problem.cases):
             targets[f"constraint {name}"] = (condition.sign, condition)
     worst_of: dict[str, Worst] = {}
-    for name, (sign, what) in targets.items():
-        shared = {n: worst_of[n].value for n in worst_of if isinstance(what, Expression) and n in what.names}
+    for name, (sign, target) in targets.items():
+        shared = {n: worst_of[n].value for n in worst_of if isinstance(target, Expression) and n in target.names}
         measured = []
-        for case in _peaks(problem, parameters, sign, what, shared):
+        for case in _peaks(problem, parameters, sign, target, shared):
             values = problem.values(case.applied(parameters)).with_known(shared)
-            measured.append(Worst(case, float(values[what] if isinstance(what, str) else what(values))))
+            measured.append(Worst(case, float(values[target] if isinstance(target, str) else target(values))))
         worst_of[name] = max(measured, key=lambda w: sign * w.value if np.isfinite(w.value) else np.inf)
     return worst_of
 
 
-def _peaks(problem: Posed, parameters: Numbers, sign: float, what: Expression | str, shared: Numbers) -> Iterator[Case]:
+def _peaks(
+    problem: Posed, parameters: Numbers, sign: float, target: Expression | str, shared: Numbers
+) -> Iterator[Case]:
     """The refined worst points of a grid, for every choice of separate scenario values."""
     bands = {n: s for n, s in problem.scenarios.items() if isinstance(s, Band)}
-    separate = {n: s for n, s in problem.scenarios.items() if not isinstance(s, Band)}
+    separate_values = {n: s for n, s in problem.scenarios.items() if not isinstance(s, Band)}
     size = len(bands) + len(problem.tolerances)
 
     def case_at(u: Array) -> Case:
@@ -87,29 +89,29 @@ def _peaks(problem: Posed, parameters: Numbers, sign: float, what: Expression | 
         return Case({**fixed, **at}, {n: t * (2 * columns.pop(0) - 1) for n, t in problem.tolerances.items()})
 
     def badness(u: Array) -> Array:
-        [values] = evaluate(problem, [what], {**case_at(u).applied(parameters), **shared})
+        [values] = evaluate(problem, [target], {**case_at(u).applied(parameters), **shared})
         return np.where(np.isfinite(values), sign * values, np.inf) * np.ones(len(u))
 
-    for chosen in product(*separate.values()):
-        fixed = dict(zip(separate, chosen, strict=True))
+    for choice in product(*separate_values.values()):
+        fixed = dict(zip(separate_values, choice, strict=True))
         if size == 0:
             yield Case(Table(fixed))
             continue
         u = _start_points(size)
-        high = badness(u)
+        heights = badness(u)
         step = 1 / (_LINE_POINTS - 1) if size == 1 else 0.5 * len(u) ** (-1 / size)
-        rows = _separate_peaks(u, high, 4 * step)
-        best, value, indices = u[rows], high[rows], np.arange(len(rows))
+        rows = _separate_peaks(u, heights, 4 * step)
+        best_points, value, indices = u[rows], heights[rows], np.arange(len(rows))
         moves = _random_steps(len(rows), size)
         for look in range(_ROUNDS):  # all peaks at once, since calls cost more than points
             reach = step * (_SHRINK if size == 1 else _SHRINK ** (1 / 2)) ** look
-            around = np.clip(best[:, None] + reach * moves[:, look], 0, 1)
+            around = np.clip(best_points[:, None] + reach * moves[:, look], 0, 1)
             trial = badness(around.reshape(-1, size)).reshape(len(rows), _POINTS_AROUND)
-            top = np.argmax(trial, axis=1)
-            higher = trial[indices, top] > value
-            best = np.where(higher[:, None], around[indices, top], best)
-            value = np.where(higher, trial[indices, top], value)
-        for case in map(case_at, best):
+            top_indices = np.argmax(trial, axis=1)
+            is_higher = trial[indices, top_indices] > value
+            best_points = np.where(is_higher[:, None], around[indices, top_indices], best_points)
+            value = np.where(is_higher, trial[indices, top_indices], value)
+        for case in map(case_at, best_points):
             yield Case(Table(case.at), Table(case.offset))
 
 
@@ -141,15 +143,15 @@ def _random_steps(peaks: int, size: int) -> Array:
     return steps
 
 
-def _separate_peaks(u: Array, high: Array, distance: float) -> list[int]:
+def _separate_peaks(u: Array, heights: Array, distance: float) -> list[int]:
     """Indices of the highest points at least a distance apart."""
-    chosen: list[int] = []
-    for k in np.argsort(-high, kind="stable"):
-        if all(np.abs(u[k] - u[c]).max() > distance for c in chosen):
-            chosen.append(int(k))
-        if len(chosen) == _MAX_PEAKS:
+    peaks: list[int] = []
+    for k in np.argsort(-heights, kind="stable"):
+        if all(np.abs(u[k] - u[c]).max() > distance for c in peaks):
+            peaks.append(int(k))
+        if len(peaks) == _MAX_PEAKS:
             break
-    return chosen
+    return peaks
 
 
 _Box = dict[tuple[bool, str], Interval]
@@ -167,13 +169,13 @@ def prove_worst_case(problem: Posed, parameters: Numbers, worst: float, boxes: i
     limit, box_count = worst + SLACK * (1 + abs(worst)), 0
     choices = [[(s.min, s.max)] if isinstance(s, Band) else [(v, v) for v in s] for s in problem.scenarios.values()]
     offset: _Box = {(True, n): round_outwards(-t, t) for n, t in problem.tolerances.items()}
-    waiting = deque[_Box]()
-    for each in product(*choices):  # bands and tolerances whole
-        at = zip(problem.scenarios, each, strict=True)
-        waiting.append({(False, n): round_outwards(*ends) for n, ends in at} | offset)
+    open_boxes = deque[_Box]()
+    for ranges in product(*choices):  # bands and tolerances whole
+        at = zip(problem.scenarios, ranges, strict=True)
+        open_boxes.append({(False, n): round_outwards(*ends) for n, ends in at} | offset)
     with flint.ctx.workdps(_DIGITS):
-        while waiting and box_count < boxes:
-            box = waiting.popleft()
+        while open_boxes and box_count < boxes:
+            box = open_boxes.popleft()
             box_count += 1
             if not _is_left_of(problem, parameters, box, flint.arb(limit)):
                 side = next((side for side, (lower, upper) in box.items() if lower < (lower + upper) / 2 < upper), None)
@@ -181,24 +183,24 @@ def prove_worst_case(problem: Posed, parameters: Numbers, worst: float, boxes: i
                     return Cover(limit, False, box_count)
                 lower, upper = box.pop(side)
                 middle = (lower + upper) / 2
-                waiting += [{**box, side: half} for half in ((lower, middle), (middle, upper))]
-    return Cover(limit, not waiting, box_count)
+                open_boxes += [{**box, side: half} for half in ((lower, middle), (middle, upper))]
+    return Cover(limit, not open_boxes, box_count)
 
 
 def _is_left_of(problem: Posed, parameters: Numbers, box: _Box, gamma: Any) -> bool:
     """Whether every design in a box certainly has all roots left of the line Re s = γ."""
 
-    def tests(box: _Box, moving: str = "") -> list[Any]:
+    def tests(box: _Box, series_name: str = "") -> list[Any]:
         """Numbers that are all positive exactly if every root is left of the line.
 
         Args:
-            moving: a parameter that becomes a power series, which gives the slopes.
+            series_name: a parameter that becomes a power series, which gives the slopes.
         """
         at: dict[str, Any] = {n: flint.arb(x) for n, x in parameters.items()}
         for (added, n), ends in sorted(box.items()):  # a parameter may have both; the scenario comes first
             at[n] = ball(ends) + (at[n] if added else 0)
-        if moving:
-            at[moving] = flint.arb_series([at[moving], 1], prec=2)
+        if series_name:
+            at[series_name] = flint.arb_series([at[series_name], 1], prec=2)
         a = problem.model.coefficients(at, problem.parameter_set)
         sign = -1 if _series_term(a[0], 0) < 0 else 1
         shifted = [sign * c for c in shift(a, gamma)]

@@ -243,8 +243,8 @@ def name_unknowns(pattern: str, unknowns: Mapping[str, Array], parameters: Itera
 
 def kinds_along(branch: Branch) -> list[str]:
     """The pattern at each point; a special point, such as an EP4, gets the pattern of the point before it."""
-    special = {e.index for e in branch.events if str(branch.kinds[e.index]) == e.name}
+    special_rows = {e.index for e in branch.events if str(branch.kinds[e.index]) == e.name}
     kinds = [str(k) for k in branch.kinds]
-    for row in sorted(special) if len(kinds) > 1 else ():
+    for row in sorted(special_rows) if len(kinds) > 1 else ():
         kinds[row] = kinds[row - 1] if row else kinds[1]
     return kinds

@@ -101,17 +101,17 @@ def compile_curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Arr
     system = ca.Function("system", [x], [equations, ca.jacobian(equations, x)])
     y, t, s, origin = ca.SX.sym("y", size), ca.SX.sym("t", size), ca.SX.sym("s"), ca.SX.sym("origin", size)
     value, jacobian = system(y * unit)
-    scaled = ca.Function("scaled", [y], [ca.densify(value), ca.densify(ca.densify(jacobian) @ ca.diag(unit))])
+    scaled_system = ca.Function("scaled", [y], [ca.densify(value), ca.densify(ca.densify(jacobian) @ ca.diag(unit))])
     low, high = lower / scale, upper / scale
     if equations.numel() != size - 1:
-        return Curve(scale, low, high, scaled, None)
+        return Curve(scale, low, high, scaled_system, None)
     z, sizes = y + s * t, []
     for _ in range(3):
-        value, jacobian = scaled(z)
+        value, jacobian = scaled_system(z)
         correction = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(value, ca.dot(t, z - y) - s))
         z = z - correction
         sizes.append(ca.norm_2(correction) / (1 + ca.norm_inf(z)))
-    value, jacobian = scaled(z)
+    value, jacobian = scaled_system(z)
     tangent = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(ca.DM.zeros(size - 1), 1))
     tangent = tangent / ca.norm_2(tangent)
 
@@ -123,7 +123,7 @@ def compile_curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Arr
     checks = ca.vertcat(
         *sizes, ca.dot(t, tangent), reach, slack, ca.norm_inf(z), ca.norm_2(origin - y), ca.dot(t, origin - y)
     )
-    return Curve(scale, low, high, scaled, ca.Function("advance", [y, t, s, origin], [z, tangent, checks]))
+    return Curve(scale, low, high, scaled_system, ca.Function("advance", [y, t, s, origin], [z, tangent, checks]))
 
 
 def compute_tangent(curve: Curve, y: Array) -> Array:
@@ -149,15 +149,17 @@ def follow(curve: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
     """
 
     def advance(y: Array, t: Array, s: float) -> tuple[Any, ...]:
-        new, tangent, checks = step_from(y[None], t[None], np.array([[s]]), start.y[None])
-        return new[0], tangent[0], *checks[0].tolist()
+        next_y, tangent, checks = step_from(y[None], t[None], np.array([[s]]), start.y[None])
+        return next_y[0], tangent[0], *checks[0].tolist()
 
     y, t, count, step_from = start.y, start.t, 1, MappedFunction(curve.advance, 1)
     s, reach = step / 4, advance(y, t, 0.0)[6]
     while True:
         s = min(s, step * reach)
         while True:
-            new, tangent, first, second, third, cosine, reach, slack, largest, far, ahead = advance(y, t, s)
+            next_y, tangent, first, second, third, cosine, reach, slack, largest, origin_distance, origin_step = (
+                advance(y, t, s)
+            )
             if (
                 third <= _NEWTON_TOLERANCE
                 and cosine >= _MIN_COSINE
@@ -168,17 +170,22 @@ def follow(curve: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
             if s < _MIN_STEP:
                 yield End(INFINITE if np.abs(y).max() > _INFINITE_SIZE else SINGULAR)
                 return
-        if count > 2 and 0 < ahead <= s and far <= 2 * s and _is_same_point(advance(y, t, ahead)[0], start.y):
+        if (
+            count > 2
+            and 0 < origin_step <= s
+            and origin_distance <= 2 * s
+            and _is_same_point(advance(y, t, origin_step)[0], start.y)
+        ):
             yield from (start, End(CLOSED))
             return
-        if slack < 0 and not _runs_along_limit(curve, new, tangent):
-            yield from _stop_at_limit(curve, y, t, s, new)
+        if slack < 0 and not _runs_along_limit(curve, next_y, tangent):
+            yield from _stop_at_limit(curve, y, t, s, next_y)
             return
-        yield CurvePoint(new, tangent)
+        yield CurvePoint(next_y, tangent)
         if largest > _MAX_SIZE:
             yield End(INFINITE)
             return
-        y, t, s, count = new, tangent, s * _STEP_GROWTH, count + 1
+        y, t, s, count = next_y, tangent, s * _STEP_GROWTH, count + 1
 
 
 def walk(curve: Curve, y: Array, t: Array, step: float, max_points: int) -> Walk:
@@ -196,18 +203,21 @@ def walk_both_ways(curve: Curve, y: Array, step: float, max_points: int) -> Walk
         t = compute_tangent(curve, y)
     except ValueError:
         return None
-    whole = walk(curve, y, t, step, max_points)
-    if not whole.closed:
-        back = walk(curve, y, -t, step, max_points)
-        points, tangents = (np.concatenate(x) for x in ([back.y[:0:-1], whole.y], [-back.t[:0:-1], whole.t]))
-        whole = Walk(points, tangents, (back.ends[1], whole.ends[1]))
-    return replace(whole, seconds=time.perf_counter() - started) if len(whole.y) > 2 else None
+    forward_walk = walk(curve, y, t, step, max_points)
+    if not forward_walk.closed:
+        backward_walk = walk(curve, y, -t, step, max_points)
+        points, tangents = (
+            np.concatenate(x)
+            for x in ([backward_walk.y[:0:-1], forward_walk.y], [-backward_walk.t[:0:-1], forward_walk.t])
+        )
+        forward_walk = Walk(points, tangents, (backward_walk.ends[1], forward_walk.ends[1]))
+    return replace(forward_walk, seconds=time.perf_counter() - started) if len(forward_walk.y) > 2 else None
 
 
 def step_along(curve: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
     """Points and tangents at arclengths s from points of the curve, row by row; |s| is at most a step."""
-    new, tangent, _ = map_rows(curve.advance, y, t, s[:, None], y)
-    return new, tangent
+    new_points, tangent, _ = map_rows(curve.advance, y, t, s[:, None], y)
+    return new_points, tangent
 
 
 def is_on_walk(curve: Curve, walked: Walk, y: Array) -> bool:
@@ -216,8 +226,8 @@ def is_on_walk(curve: Curve, walked: Walk, y: Array) -> bool:
     k = int(np.argmin(distances))
     if distances[k] > 2 * np.linalg.norm(np.diff(walked.y[max(k - 1, 0) : k + 2], axis=0), axis=1).max(initial=0.0):
         return False
-    new, _ = step_along(curve, walked.y[[k]], walked.t[[k]], np.array([walked.t[k] @ (y - walked.y[k])]))
-    return _is_same_point(new[0], y)
+    new_points, _ = step_along(curve, walked.y[[k]], walked.t[[k]], np.array([walked.t[k] @ (y - walked.y[k])]))
+    return _is_same_point(new_points[0], y)
 
 
 def _is_same_point(y: Array, reference: Array) -> bool:
@@ -227,15 +237,15 @@ def _is_same_point(y: Array, reference: Array) -> bool:
 
 def _runs_along_limit(curve: Curve, y: Array, t: Array) -> bool:
     """Whether a curve outside the limits runs along one, up to rounding."""
-    outside = np.maximum(curve.lower - y, y - curve.upper)
-    violated = outside > 0
-    return bool(np.all(outside[violated] <= _LIMIT_ROUNDING) and np.all(np.abs(t[violated]) <= _LIMIT_ROUNDING))
+    excess = np.maximum(curve.lower - y, y - curve.upper)
+    is_violated = excess > 0
+    return bool(np.all(excess[is_violated] <= _LIMIT_ROUNDING) and np.all(np.abs(t[is_violated]) <= _LIMIT_ROUNDING))
 
 
-def _stop_at_limit(curve: Curve, y: Array, t: Array, s: float, outside: Array) -> tuple[CurvePoint, End]:
+def _stop_at_limit(curve: Curve, y: Array, t: Array, s: float, outer_point: Array) -> tuple[CurvePoint, End]:
     """The point where a step s from y to a point outside first meets a limit; the point lies on the limit exactly."""
-    limits = np.clip(outside, curve.lower, curve.upper)
-    k = np.flatnonzero(limits != outside)
+    limits = np.clip(outer_point, curve.lower, curve.upper)
+    k = np.flatnonzero(limits != outer_point)
     points, tangents = np.tile(y, (len(k), 1)), np.tile(t, (len(k), 1))
     lengths = find_zeros(
         lambda r: step_along(curve, points, tangents, r)[0][range(len(k)), k] - limits[k], np.full(len(k), s)
@@ -244,4 +254,4 @@ def _stop_at_limit(curve: Curve, y: Array, t: Array, s: float, outside: Array) -
     first = k[np.argmin(lengths)]
     (last,), (tangent,) = step_along(curve, y[None], t[None], lengths.min(keepdims=True))
     last[first] = limits[first]
-    return CurvePoint(last, tangent), End("max" if outside[first] > limits[first] else "min", int(first))
+    return CurvePoint(last, tangent), End("max" if outer_point[first] > limits[first] else "min", int(first))

@@ -43,10 +43,12 @@ def make_branches(traced: TracedProblem, walk: Walk, events: Sequence[Event] = (
         row_events = [((row - first) % around, event) for row, event in row_events]
         row_events += [(around, event) for row, event in row_events if row == 0]
     stops_at = {row: End(event.name) for row, event in row_events if event.stop}
-    for low, high in pairwise(sorted({0, len(walk.y) - 1, *stops_at})):
-        ends = stops_at.get(low, walk.ends[0]), stops_at.get(high, walk.ends[1])
-        part = Walk(walk.y[low : high + 1], walk.t[low : high + 1], ends)
-        yield make_branch(traced, part, [(row - low, event) for row, event in row_events if low <= row <= high])
+    for first_row, last_row in pairwise(sorted({0, len(walk.y) - 1, *stops_at})):
+        ends = stops_at.get(first_row, walk.ends[0]), stops_at.get(last_row, walk.ends[1])
+        part = Walk(walk.y[first_row : last_row + 1], walk.t[first_row : last_row + 1], ends)
+        yield make_branch(
+            traced, part, [(row - first_row, event) for row, event in row_events if first_row <= row <= last_row]
+        )
 
 
 def find_events(traced: TracedProblem, walk: Walk, events: Sequence[Event]) -> tuple[Walk, list[RowEvent]]:
@@ -78,9 +80,9 @@ def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent
     event_rows = [(row, event.name, event.detail) for row, event in row_events]
     for row, end in () if walk.closed else zip((0, len(points) - 1), walk.ends, strict=True):
         # where roots meet but eigenvectors do not, the curve is singular
-        crossed = end.reason == SINGULAR and is_crossing(problem, pattern, table_at(columns, row))
-        event_rows.append((row, "end", CROSSING if crossed else describe_end(traced, end)))
-    located = [
+        is_crossed = end.reason == SINGULAR and is_crossing(problem, pattern, table_at(columns, row))
+        event_rows.append((row, "end", CROSSING if is_crossed else describe_end(traced, end)))
+    event_points = [
         EventPoint(name, detail, table_at(columns, row), row, float(residual[row]))
         for row, name, detail in sorted(event_rows, key=lambda n: n[0])
     ]
@@ -96,7 +98,7 @@ def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent
         heavily_damped=points.heavily_damped,
         satisfied=points.satisfied,
         abscissa=points["abscissa"],
-        events=tuple(located),
+        events=tuple(event_points),
         closed=walk.closed,
         residual=float(np.max(residual)),
         eigenfrequency=_eigenfrequency(points),
@@ -117,7 +119,7 @@ def _eigenfrequency(points: Points) -> dict[str, Array] | None:
 def _group_events(located: Sequence[LocatedEvent], free: int) -> list[list[LocatedEvent]]:
     """Events in the order of the curve, in groups at one place. In a group, the events keep the order of the list."""
     groups: list[list[int]] = []
-    for k in sorted(range(len(located)), key=lambda k: (located[k].after, located[k].s)):
+    for k in sorted(range(len(located)), key=lambda k: (located[k].row, located[k].s)):
         distance = np.abs(located[k].y - located[groups[-1][-1]].y) if groups else np.array([np.inf])
         if distance.max() > SAME_PLACE * (1 + np.abs(located[k].y).max()) and distance[:free].max() > _SAME_DESIGN:
             groups.append([])
@@ -132,7 +134,7 @@ def _merge_events(group: Sequence[LocatedEvent], events: Sequence[Event]) -> Ite
         names = {e.name for e in package_events}
         name = "double zero" if {"weave", "capsize"} <= names else package_events[0].name
         folds = dict.fromkeys(e.detail for e in package_events if e.name == "fold")
-        words = [f"next to an {higher}"] if (higher := _find_higher_order(name, names)) else []
+        words = [f"next to an {higher_point}"] if (higher_point := _find_higher_order(name, names)) else []
         for e in package_events:
             if e.name != "fold" and ("EP" not in e.name or e.name == "EP2"):
                 words.append(e.detail if e.name == name else f"{e.name} {e.detail}".strip())
@@ -162,11 +164,11 @@ def _natural_tangent(points: Points) -> dict[str, Array]:
 def _trim_inexact_ends(traced: TracedProblem, walk: Walk) -> Walk:
     """The walk without its first and last points, near infinity, whose parameters do not fit the unknowns."""
     with np.errstate(all="ignore"):
-        good = np.flatnonzero(Points(traced, walk.y, walk.t).residual <= _MAX_RESIDUAL)
-    if walk.closed or not good.size:
+        good_rows = np.flatnonzero(Points(traced, walk.y, walk.t).residual <= _MAX_RESIDUAL)
+    if walk.closed or not good_rows.size:
         return walk
-    inside = slice(int(good[0]), int(good[-1]) + 1)
-    return replace(walk, y=walk.y[inside], t=walk.t[inside])
+    kept_rows = slice(int(good_rows[0]), int(good_rows[-1]) + 1)
+    return replace(walk, y=walk.y[kept_rows], t=walk.t[kept_rows])
 
 
 def describe_end(traced: TracedProblem, end: End) -> str:
@@ -186,14 +188,17 @@ def _add_exact_EP4(traced: TracedProblem, walk: Walk, located: list[LocatedEvent
     On a curve of EP2, the marks of EP3 and 2EP2 both vanish at an EP4. If the section is symmetric, they only touch 0,
     and locate the EP4 to 1e-6 only.
     """
-    near = [f for f in located if f.event.name == "EP4"]
+    candidates = [f for f in located if f.event.name == "EP4"]
     if traced.pattern.form == "EP2" and {"EP3", "2EP2"} <= {*traced.pattern.marks}:
-        _, refined = insert_events(walk, located)
-        points = Points(traced, refined.y, refined.t)
+        _, refined_walk = insert_events(walk, located)
+        points = Points(traced, refined_walk.y, refined_walk.t)
         height = np.abs(points.mark("EP3")) + np.abs(points.mark("2EP2"))
-        least = (height[1:-1] <= height[:-2]) & (height[1:-1] <= height[2:]) & (height[1:-1] < _LOW_MARK)
-        near += [LocatedEvent(_EP4, refined.y[k], refined.t[k], k, 0.0) for k in (np.flatnonzero(least) + 1).tolist()]
-    return [*filter(None, (_exact_EP4(traced, walk, f) for f in near)), *located]
+        is_minimum = (height[1:-1] <= height[:-2]) & (height[1:-1] <= height[2:]) & (height[1:-1] < _LOW_MARK)
+        candidates += [
+            LocatedEvent(_EP4, refined_walk.y[k], refined_walk.t[k], k, 0.0)
+            for k in (np.flatnonzero(is_minimum) + 1).tolist()
+        ]
+    return [*filter(None, (_exact_EP4(traced, walk, f) for f in candidates)), *located]
 
 
 def _exact_EP4(traced: TracedProblem, walk: Walk, located: LocatedEvent) -> LocatedEvent | None:

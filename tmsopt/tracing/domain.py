@@ -134,9 +134,9 @@ def _is_in_edge(branch: Branch, problem: Posed) -> bool:
     return any(np.abs(column - limit).max() <= _EDGE_DISTANCE * width for column, limit, width in limits)
 
 
-def _find_runs(inside: Truth) -> list[list[int]]:
+def _find_runs(is_inside: Truth) -> list[list[int]]:
     """First index of each run of true values, and the index after its last one."""
-    runs: list[list[int]] = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0)).reshape(-1, 2).tolist()
+    runs: list[list[int]] = np.flatnonzero(np.diff(is_inside.astype(int), prepend=0, append=0)).reshape(-1, 2).tolist()
     return runs
 
 
@@ -152,13 +152,13 @@ def _list_changes(curve: InfinityCurve, corners: bool = False) -> Iterator[Corne
             yield Corner(name, detail, table_at(curve.parameters, row))
 
 
-def _cut_arcs(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
+def _cut_arcs(branch: Branch, is_inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
     """Runs of points that bound a domain, with the events at their ends, and with a corner next to an end."""
-    is_bound, corner_at = inside.copy(), dict[int, Corner]()
+    is_bound, corner_at = is_inside.copy(), dict[int, Corner]()
     for event in branch.events:
         k = event.index
         if event.name != "end":
-            is_bound[k] = bool(inside[max(k - 1, 0)] or inside[min(k + 1, len(branch) - 1)])
+            is_bound[k] = bool(is_inside[max(k - 1, 0)] or is_inside[min(k + 1, len(branch) - 1)])
         elif event.detail.startswith((INFINITE, SINGULAR)) and at_infinity:
             parameters, widths = event.parameters, {n: high - low for n, (low, high) in problem.free.items()}
             distances = [max(abs(parameters[n] - c.parameters[n]) / w for n, w in widths.items()) for c in at_infinity]
@@ -178,20 +178,19 @@ def _bounds_stability(branch: Branch, problem: Posed) -> Truth:
     """
     other_factors = pattern_of(problem.model, branch.pattern).remaining_factors(list(branch.unknowns.values()))
     z = roots_along(other_factors, len(branch))
-    tied = np.where(is_on_axis(z), np.abs(z) ** 2, -1.0).max(
+    axis_frequency = np.where(is_on_axis(z), np.abs(z) ** 2, -1.0).max(
         axis=-1, initial=-1.0
     )  # squared frequency of the fastest pair on the axis
-    if np.all(tied < 0):
+    if np.all(axis_frequency < 0):
         return branch.stable
-    (x, dx, wide), (y, dy, high) = (
-        (branch.parameters[n], branch.tangent[n] / (end - begin), end - begin)
-        for n, (begin, end) in problem.free.items()
+    (x, dx, x_width), (y, dy, y_width) = (
+        (branch.parameters[n], branch.tangent[n] / (end - low), end - low) for n, (low, end) in problem.free.items()
     )
     offset = np.array([[-_SIDE_OFFSET], [_SIDE_OFFSET]]) / (np.hypot(dx, dy) + 1e-300)
-    sides = dict(zip(problem.free, (x - offset * wide * dy, y + offset * high * dx), strict=True))
+    sides = dict(zip(problem.free, (x - offset * x_width * dy, y + offset * y_width * dx), strict=True))
     with np.errstate(all="ignore"):  # outside the model's range nan is not stable
         stable_on_left, stable_on_right = is_stable(compute_coefficients(problem, sides))
-    fastest = (tied >= 0) & (branch.unknowns.get("W", np.inf) >= tied)
+    fastest = (axis_frequency >= 0) & (branch.unknowns.get("W", np.inf) >= axis_frequency)
     return np.asarray(branch.stable | (fastest & (stable_on_left != stable_on_right)))
 
 
@@ -219,11 +218,11 @@ def _is_drawn_here(branch: Branch) -> Truth:
 
 def _list_corners(branch: Branch, problem: Posed) -> Iterator[Corner]:
     """Events where a boundary of a domain turns, crosses another or ends inside the box."""
-    inside = branch.heavily_damped if branch.pattern == "EP2" else branch.stable
+    is_inside = branch.heavily_damped if branch.pattern == "EP2" else branch.stable
     ends = pattern_of(problem.model, branch.pattern).ends.values()
     for event in branch.events:
         turns = event.detail in ends if event.name == "end" else event.name not in ("fold", "constraint")
-        if turns and np.any(inside[max(event.index - 1, 0) : event.index + 2]):
+        if turns and np.any(is_inside[max(event.index - 1, 0) : event.index + 2]):
             name = "double zero" if event.name == "end" else event.name
             yield Corner(name, event.detail, {n: event.parameters[n] for n in problem.free})
 

@@ -65,12 +65,12 @@ class Event:
 
 @dataclass(frozen=True)
 class LocatedEvent:
-    """A zero of an event at an arclength s after the row `after` of a walk."""
+    """A zero of an event at an arclength s after a row of a walk."""
 
     event: Event
     y: Array
     t: Array
-    after: int
+    row: int
     s: float
 
 
@@ -110,11 +110,13 @@ def _evaluate_at(event: Event, point: Mapping[str, float]) -> float:
         value = event.function(point)
         if is_number(value):
             return float(value)
-        what = f"the function returns {short(value)}"
+        problem_text = f"the function returns {short(value)}"
     except Exception as error:
-        what = f"the function raises {type(error).__name__}: {error}"
+        problem_text = f"the function raises {type(error).__name__}: {error}"
     place = ", ".join(f"{name} = {point[name]:.6g}" for name in point)
-    raise input_error(f"{what} at {place}; accepted: a finite number at every point of the curve", "events", event.name)
+    raise input_error(
+        f"{problem_text} at {place}; accepted: a finite number at every point of the curve", "events", event.name
+    )
 
 
 @dataclass(frozen=True)
@@ -163,7 +165,7 @@ def locate_events(traced: TracedProblem, walk: Walk, events: Sequence[Event] = (
     points, free = Points(traced, walk.y, walk.t), list(traced.problem.free)
     for event, values in _list_active(points, events):
         for located in locate_zeros(traced.curve, walk, partial(Points, traced), event, values):
-            y, row = located.y, located.after
+            y, row = located.y, located.row
             changes = event.name not in ("weave", "capsize") or points.stable[row] != points.stable[row + 1]
             if changes and (event.name != "fold" or _is_fold(walk, row, y, free.index(event.detail))):
                 yield located
@@ -179,13 +181,13 @@ def locate_zeros(
     if rows.size:
         s = find_zeros(lambda s: event.function(make_points(*step_along(curve, points, tangents, s))), ends)
         real = np.isfinite(s)  # otherwise the sign changes at a pole, by noise, or at nan
-        located = zip(
+        zeros = zip(
             *step_along(curve, points[real], tangents[real], s[real]),
             rows[real].tolist(),
             s[real].tolist(),
             strict=True,
         )
-        for y, t, row, length in located:
+        for y, t, row, length in zeros:
             if (
                 np.abs(y - walk.y[row]).max() <= _MAX_DEVIATION * length + SAME_PLACE
             ):  # otherwise it is on another curve
@@ -210,20 +212,23 @@ def refine_walk(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ())
     minima: dict[tuple[int, float], LocatedEvent] = {}
     for event, value in _list_active(Points(traced, walk.y, walk.t), events):
         side = np.sign(value[1:-1])
-        value_before, height_at, value_after = side * value[:-2], side * value[1:-1], side * value[2:]
+        value_before, height_here, value_after = side * value[:-2], side * value[1:-1], side * value[2:]
         with np.errstate(all="ignore"):  # slope and second derivative of the parabola through three values
-            slope_before, slope_after = (height_at - value_before) / step_before, (value_after - height_at) / step_after
+            slope_before, slope_after = (
+                (height_here - value_before) / step_before,
+                (value_after - height_here) / step_after,
+            )
             slope, bend = (
                 (slope_before * step_after + slope_after * step_before) / (step_before + step_after),
                 2 * (slope_after - slope_before) / (step_before + step_after),
             )
             dips = (
-                (height_at <= value_before)
-                & (height_at <= value_after)
+                (height_here <= value_before)
+                & (height_here <= value_after)
                 & (bend > 0)
-                & (slope**2 / (2 * bend) > _MIN_DIP * height_at)
+                & (slope**2 / (2 * bend) > _MIN_DIP * height_here)
             )
-        for k in np.flatnonzero(dips & (step_before > 0) & (step_after > 0) & (height_at > 0)).tolist():
+        for k in np.flatnonzero(dips & (step_before > 0) & (step_after > 0) & (height_here > 0)).tolist():
             row = walk.y[[k + 1]], walk.t[[k + 1]]
 
             def height(s: float, event: Event = event, row: tuple[Array, Array] = row, sign: float = side[k]) -> float:
@@ -231,10 +236,10 @@ def refine_walk(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ())
 
             from scipy.optimize import minimize_scalar  # importing it takes 0.2 s
 
-            least = minimize_scalar(
+            minimum = minimize_scalar(
                 height, bounds=(-step_before[k], step_after[k]), method="bounded", options={"xatol": 1e-14}
             )
-            s, nearby = float(least.x), step_along(traced.curve, *row, np.array([least.x]))
+            s, nearby = float(minimum.x), step_along(traced.curve, *row, np.array([minimum.x]))
             # correct the point again, since Newton's method converges slowly near singular points
             (y,), (t,) = step_along(traced.curve, *nearby, np.zeros(1))
             if np.abs(y - row[0][0]).max() <= _MAX_DEVIATION * abs(s) and t @ row[1][0] > 0:
@@ -245,17 +250,17 @@ def refine_walk(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ())
 
 def insert_events(walk: Walk, located: Sequence[LocatedEvent]) -> tuple[list[int], Walk]:
     """The rows of the events, in order, and the walk with them among its points."""
-    order = np.argsort([*range(len(walk.y)), *(f.after + 0.5 for f in located)], kind="stable")
+    order = np.argsort([*range(len(walk.y)), *(f.row + 0.5 for f in located)], kind="stable")
     y, t = np.array([*walk.y, *(f.y for f in located)]), np.array([*walk.t, *(f.t for f in located)])
     return np.flatnonzero(order >= len(walk.y)).tolist(), replace(walk, y=y[order], t=t[order])
 
 
 def _list_active(points: Points, events: Iterable[Event]) -> Iterator[tuple[Event, Array]]:
     """The events whose functions are not 0 all along the curve, with their values."""
-    special = points.special
+    special_names = points.special
     for event in (*list_package_events(points), *events):
         value = points.column(event.function(points))
-        if event.name not in special and (event.name != "fold" or np.abs(value).max() > NOTHING):
+        if event.name not in special_names and (event.name != "fold" or np.abs(value).max() > NOTHING):
             yield event, value
 
 
@@ -265,5 +270,10 @@ def _is_fold(walk: Walk, i: int, y: Array, k: int) -> bool:
     Where the equations are singular, the tangent alone is not reliable.
     """
     rows = np.clip([[i, i - 1], [i + 1, i + 2]], 0, len(walk.y) - 1)
-    back, ahead = walk.y[rows, k] - y[k]
-    return bool(np.any((back * ahead > 0) & (np.minimum(abs(back), abs(ahead)) > _ROUNDING * (1 + abs(y[k])))))
+    offset_before, offset_after = walk.y[rows, k] - y[k]
+    return bool(
+        np.any(
+            (offset_before * offset_after > 0)
+            & (np.minimum(abs(offset_before), abs(offset_after)) > _ROUNDING * (1 + abs(y[k])))
+        )
+    )

@@ -88,9 +88,9 @@ def _describe_curve(problem: Posed, curve: Curve, walk: Walk, other_coefficients
         """Functions whose zeros are changes of the other roots, each with the name of the change."""
         v = values(y)
         c = list(v[:, : -2 if constant_vanishes else -1].T)
-        tested = [("weave" if k else "capsize", value) for k, value in enumerate(axis_functions(c))]
-        tested += [("EP2", double_root_test(c))] if len(c) > 2 else []
-        return [("infinity", c[0]), *tested, *([("capsize", v[:, -1])] if constant_vanishes else [])]
+        named_functions = [("weave" if k else "capsize", value) for k, value in enumerate(axis_functions(c))]
+        named_functions += [("EP2", double_root_test(c))] if len(c) > 2 else []
+        return [("infinity", c[0]), *named_functions, *([("capsize", v[:, -1])] if constant_vanishes else [])]
 
     size = np.abs(values(walk.y)[:, :-1])
     constant_vanishes = bool(np.all(size[:, -1] <= _ZERO_TERM * size.max(axis=1)))
@@ -98,10 +98,10 @@ def _describe_curve(problem: Posed, curve: Curve, walk: Walk, other_coefficients
     for k, (name, column) in enumerate(tests(walk.y)):
         event = Event(name, partial(lambda k, tested: tested[k][1], k))
         located += locate_zeros(curve, walk, lambda y, t: tests(y), event, column)
-    located.sort(key=lambda f: (f.after, f.s, f.event.name))
+    located.sort(key=lambda f: (f.row, f.s, f.event.name))
     rows, walk = insert_events(walk, located)
-    distinct = np.append(True, np.any(np.diff(walk.y, axis=0) != 0, axis=1))  # a zero may be at a point of the walk
-    points, numbers = walk.y[distinct], (np.cumsum(distinct) - 1)[rows].tolist()
+    is_distinct = np.append(True, np.any(np.diff(walk.y, axis=0) != 0, axis=1))  # a zero may be at a point of the walk
+    points, numbers = walk.y[is_distinct], (np.cumsum(is_distinct) - 1)[rows].tolist()
     bounds = _classify_segments(values((points[1:] + points[:-1]) / 2), constant_vanishes)
     row_events = zip(numbers, [f.event.name for f in located], strict=True)
     changes = {row: name for row, name in row_events if any(b[row - 1] != b[row] for b in bounds)}
@@ -116,11 +116,11 @@ def _classify_segments(v: Array, constant_vanishes: bool) -> tuple[Truth, Truth,
     """
     c = v[:, : -2 if constant_vanishes else -1]
     stable, damped, parting = np.zeros((3, len(c)), dtype=bool)
-    proper = c[:, 0] != 0
+    is_proper = c[:, 0] != 0
     if constant_vanishes:
-        proper &= v[:, -1] > 0
-    stable[proper] = is_stable(c[proper])
-    negative, positive = real_roots(c[proper])
-    damped[proper] = stable[proper] & (negative == c.shape[1] - 1)
-    parting[proper] = ~stable[proper] & (positive == 0)
+        is_proper &= v[:, -1] > 0
+    stable[is_proper] = is_stable(c[is_proper])
+    negative, positive = real_roots(c[is_proper])
+    damped[is_proper] = stable[is_proper] & (negative == c.shape[1] - 1)
+    parting[is_proper] = ~stable[is_proper] & (positive == 0)
     return stable, damped, parting

@@ -69,12 +69,12 @@ def find_unexplained(
 
 def is_far_from_line(points: Array, line: Array, distance: float) -> Truth:
     """Which of the points, shape (n, 2), are farther than a distance from a polyline of shape (m, 2)."""
-    start, edges, far = line[:-1] @ (1, 1j), np.diff(line, axis=0) @ (1, 1j) + 1e-300, []  # in the complex plane
+    start, edges, is_far = line[:-1] @ (1, 1j), np.diff(line, axis=0) @ (1, 1j) + 1e-300, []  # in the complex plane
     for block in np.array_split(points @ (1, 1j), len(points) // _BLOCK_SIZE + 1):
         offset = block[:, None] - start
         share = np.clip((offset / edges).real, 0, 1)
-        far.append(np.abs(offset - share * edges).min(axis=1) > distance)
-    return np.concatenate(far)
+        is_far.append(np.abs(offset - share * edges).min(axis=1) > distance)
+    return np.concatenate(is_far)
 
 
 def walk_new_curves(
@@ -104,10 +104,12 @@ def find_seeds(
         (0, points) for points in _project_designs(traced, first_designs, [None] * len(first_designs), _MAX_GUESSES)
     )
     fruitless, walk_count, count = 0, len(walks), 0
-    ways = cycle([None, *range(free)])
+    held_variables = cycle([None, *range(free)])
     designs = sample_box(problem, seed)
     while count < (starts if _grid_test(traced) else _MAX_ROUNDS * starts):
-        for points in _project_designs(traced, list(islice(designs, starts)), list(islice(ways, starts)), _MAX_GUESSES):
+        for points in _project_designs(
+            traced, list(islice(designs, starts)), list(islice(held_variables, starts)), _MAX_GUESSES
+        ):
             if fruitless >= starts:
                 return
             count += 1
@@ -139,11 +141,11 @@ def find_beyond_infinity(traced: TracedProblem, walks: Sequence[Walk]) -> Iterat
             if end.reason != INFINITE:
                 continue
             size = np.abs(y[:, free:]).max(axis=1)
-            begin = np.max(np.flatnonzero(size < _EXTRAPOLATION_SIZE), initial=0)
-            if begin < len(y) - 2:
-                (near, far), weight = (y[begin, :free], y[-1, :free]), size[begin] / size[-1]
-                limit = (far - weight * near) / (1 - weight)
-                x = (2 * limit - near) * traced.curve.scale[:free]
+            row = np.max(np.flatnonzero(size < _EXTRAPOLATION_SIZE), initial=0)
+            if row < len(y) - 2:
+                (near_point, far_point), weight = (y[row, :free], y[-1, :free]), size[row] / size[-1]
+                limit = (far_point - weight * near_point) / (1 - weight)
+                x = (2 * limit - near_point) * traced.curve.scale[:free]
                 yield 0, _project_designs(traced, [design_at(traced.problem, x)])[0]
 
 
@@ -164,12 +166,13 @@ def _project_designs(
         return [[] for _ in designs]
     owner = [k for k, _ in starts]
     y = project_rows(curve.evaluate, np.array([y for _, y in starts]), [held_variables[k] for k in owner])
-    inside = np.all((y >= curve.lower - 1e-12) & (y <= curve.upper + 1e-12), axis=1)  # never for nan
-    inside &= np.abs(y[:, free:]).max(axis=1) <= _MAX_UNKNOWN
+    is_inside = np.all((y >= curve.lower - 1e-12) & (y <= curve.upper + 1e-12), axis=1)  # never for nan
+    is_inside &= np.abs(y[:, free:]).max(axis=1) <= _MAX_UNKNOWN
     y = np.clip(y, curve.lower, curve.upper)
-    inside[inside] = traced.has_leading_coefficient(
-        compute_coefficients(traced.problem, design_at(traced.problem, y[inside] * curve.scale))
+    is_inside[is_inside] = traced.has_leading_coefficient(
+        compute_coefficients(traced.problem, design_at(traced.problem, y[is_inside] * curve.scale))
     )
     return [
-        [y[i] for i, design_index in enumerate(owner) if design_index == k and inside[i]] for k in range(len(designs))
+        [y[i] for i, design_index in enumerate(owner) if design_index == k and is_inside[i]]
+        for k in range(len(designs))
     ]

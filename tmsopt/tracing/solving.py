@@ -32,8 +32,8 @@ def project_rows(system: ca.Function, y: Array, held_variables: Sequence[int | N
     rows: NDArray[np.intp] = np.arange(len(y))
     for _ in range(_MAX_STEPS):
         value, jacobian = evaluate_rows(system, y[rows])
-        proper = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(jacobian), axis=(1, 2))
-        rows, value, jacobian = rows[proper], value[proper], jacobian[proper]
+        is_finite = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(jacobian), axis=(1, 2))
+        rows, value, jacobian = rows[is_finite], value[is_finite], jacobian[is_finite]
         if not rows.size:
             break
         points, size = y[rows], np.abs(value).max(axis=1)
@@ -62,8 +62,8 @@ def find_zeros(function: Callable[[Array], Array], ends: Array) -> Array:
     a, b = ends.astype(float), np.zeros(len(ends))
     fa, fb = function(a), function(b)
     zeros = np.where(np.abs(fa) < np.abs(fb), a, b)
-    small, large = np.sort(np.abs([fa, fb]), axis=0)
-    zeros = np.where(small <= _END_RATIO * large, zeros, np.nan)  # rounding may hide a zero at an end
+    smaller_end, larger_end = np.sort(np.abs([fa, fb]), axis=0)
+    zeros = np.where(smaller_end <= _END_RATIO * larger_end, zeros, np.nan)  # rounding may hide a zero at an end
     active = np.sign(fa) * np.sign(fb) < 0
     share = np.full(len(ends), 0.5)
     for _ in range(_MAX_HALVINGS):

@@ -58,9 +58,9 @@ def continue_from(
                 return Continuation(traced, CurvePoint(y, compute_tangent(traced.curve, y)), step, checked_events)
             except ValueError:  # not a regular point of a curve
                 continue
-    near = "near the design" if designs else "in the box"
+    place = "near the design" if designs else "in the box"
     raise input_error(
-        f"no point of {problem_with_pattern.locate} found {near}; give another point to begin at", "through"
+        f"no point of {problem_with_pattern.locate} found {place}; give another point to begin at", "through"
     )
 
 
@@ -102,19 +102,19 @@ class Continuation(Iterator[BranchPoint]):
 
     def _follow(self, start: CurvePoint, fresh: bool) -> Iterator[BranchPoint]:
         """Yield the points after a start, also the start itself if `fresh`; then set `end`."""
-        behind = [start]
-        for new in follow(self._traced.curve, start, self._step):
-            if isinstance(new, End):
-                self.end = describe_end(self._traced, new) or CLOSED
+        previous_points = [start]
+        for point in follow(self._traced.curve, start, self._step):
+            if isinstance(point, End):
+                self.end = describe_end(self._traced, point) or CLOSED
                 return
-            y, t = (np.array([getattr(p, name) for p in (*behind, new)]) for name in "yt")
+            y, t = (np.array([getattr(p, name) for p in (*previous_points, point)]) for name in "yt")
             walk, row_events = find_events(self._traced, Walk(y, t, (End(""), End(""))), self._events)
             branch, arclength = make_branch(self._traced, walk, row_events), self._arclength
-            first = int(np.flatnonzero(np.all(walk.y == behind[-1].y, axis=1))[-1])
+            first = int(np.flatnonzero(np.all(walk.y == previous_points[-1].y, axis=1))[-1])
             for row in range(first + (not fresh), len(walk.y)):
                 events = [event for at, event in row_events if at == row]
                 is_repeated = (
-                    len(behind) == 1 and np.abs(walk.y[row] - start.y).max() <= SAME_PLACE
+                    len(previous_points) == 1 and np.abs(walk.y[row] - start.y).max() <= SAME_PLACE
                 )  # the user turned around at this event
                 if (events and not is_repeated) or row == len(walk.y) - 1 or (fresh and row == first):
                     self._last = CurvePoint(walk.y[row], walk.t[row])
@@ -132,4 +132,4 @@ class Continuation(Iterator[BranchPoint]):
                     if stop := [event.name for event in events if event.stop]:
                         self.end = stop[0]
                         return
-            behind, fresh = [behind[-1], new], False
+            previous_points, fresh = [previous_points[-1], point], False

@@ -134,11 +134,11 @@ def swallowtail(
     patches = []
     # neighbouring rows with the same cuts form one set of patches
     for _, run in groupby(range(len(grid)), key=lambda k: [[kind for _, kind in interval] for interval in cuts[k]]):
-        inside = list(run)
-        for intervals in zip(*(cuts[k] for k in inside), strict=True) if len(inside) > 1 else ():
+        rows_of_run = list(run)
+        for intervals in zip(*(cuts[k] for k in rows_of_run), strict=True) if len(rows_of_run) > 1 else ():
             table = np.array([[r for r, _ in interval] for interval in intervals])
             patches += [
-                _make_patch(plane, grid[inside], left_edge, right_edge, across)
+                _make_patch(plane, grid[rows_of_run], left_edge, right_edge, across)
                 for left_edge, right_edge in pairwise(table.T)
             ]
     return Swallowtail(plane.problem, (first, pair[0], pair[1]), tuple(patches), cusps, crossing)

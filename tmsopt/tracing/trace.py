@@ -120,21 +120,21 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
     try:
         name = pattern_of(problem.model, str(name)).name
     except ValueError as error:
-        why = "" if str(error).endswith("is no pattern") else f": {error}"
-        message = f"unknown pattern '{name}'{why}; {suggest(str(name), names)}"
+        reason = "" if str(error).endswith("is no pattern") else f": {error}"
+        message = f"unknown pattern '{name}'{reason}; {suggest(str(name), names)}"
         raise input_error(message, "objective", "locate") from error
     question = problem.derive(locate=name, minimize=None, maximize=None)
     count = degrees_of_freedom(question)
     if count.count != 1:
-        free, needed = ", ".join(problem.free) or "none", count.conditions + 1
+        free, needed_count = ", ".join(problem.free) or "none", count.conditions + 1
         advice = (
-            f"free {needed - count.free} more"
+            f"free {needed_count - count.free} more"
             if count.count < 1
             else f"fix {count.count - 1} of them, or add as many == constraints"
         )
         conditions = f"{count.conditions} condition{'s' * (count.conditions != 1)}"
         message = (
-            f"a curve of {name} needs {needed} free parameters ({conditions} and one to move along), "
+            f"a curve of {name} needs {needed_count} free parameters ({conditions} and one to move along), "
             f"found {count.free} ({free}); {advice}"
         )
         raise input_error(message, "parameters")
