@@ -828,11 +828,3 @@ def test_an_ep4_is_met_once_and_in_its_place_beside_other_events(beside: float) 
     assert [event.name for event in branch.events].count("EP4") == 1
     assert tilts in (sorted(tilts), sorted(tilts, reverse=True))
     assert np.all(np.diff(branch.arclength) > 0)
-
-
-def test_ep2_curves_end_exactly_in_the_ep4_of_the_paper():
-    """Two EP2 meet at chi_B = √2, where the discriminant has a corner: an EP4 is found by its own equations."""
-    ep4 = [event for event in trace(EP_SET.with_name("chart.toml"), "EP2").events if event.name == "EP4"]
-    assert ep4
-    for event in ep4:
-        check_ep4(event)

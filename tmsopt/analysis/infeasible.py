@@ -83,7 +83,7 @@ def _describe_conflict(solution: Solution, relaxation: Relaxation) -> str:
 def _is_proved_infeasible(solution: Solution, names: Collection[str]) -> bool:
     """Whether it is proved that no design satisfies these limits.
 
-    A proof that no design satisfies all limits is not enough if these are fewer; then intervals must confirm it.
+    If these are not all limits of the problem, a proof for all limits is not enough, and intervals must confirm it.
     """
     problem = solution.problem.posed
     constraints = {name: text for name, text in problem.constraints.items() if name in names}

@@ -70,7 +70,7 @@ class LocalProgram:
         sizes: natural size of each variable.
         rows: one for each component of h.
         functions: (x, y) → ∇f, h, ∂h/∂x and the Hessian of f − y·h.
-        line: the roots on the rightmost line, and the upper root of each complex pair there.
+        line: the roots on the rightmost line, and the upper root of each complex pair on it.
         idle: free parameters without an effect.
     """
 

@@ -113,7 +113,7 @@ def _range_violations(problem: Posed, design: Mapping[str, Any]) -> dict[str, fl
 
 
 def _is_short(solution: Solution, name: str) -> bool:
-    """Whether rounding a parameter alone leaves it unchanged."""
+    """Whether a parameter has so few digits that rounding leaves it unchanged."""
     value, unit = solution.parameters[name], unit_of(solution.problem.posed, name)
     return abs(float(_format_decimal(solution, name, unit, ALONE)) * unit.one - value) <= _UNROUNDED * abs(value)
 

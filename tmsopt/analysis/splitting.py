@@ -15,7 +15,7 @@ DEVIATION = 0.1
 """Largest relative deviation of a root from the leading term for which the law holds."""
 
 _DECADES = range(-16, 1)  # powers of ten at which a law is tested
-_DECADE_SHARES = (0.75, 0.5, 0.25)  # shares of the decade before the first failure that are tested too
+_DECADE_SHARES = (0.75, 0.5, 0.25)  # shares of the decade before the first failure that are also tested
 _MIN_DECADES = 2  # decades over which a law must hold on both sides to be confirmed
 _NEGLIGIBLE_SHARE = 1e-13  # share of coefficients that count as 0, because their roots move far more slowly
 _COUNTED_CHANGES = (1e-2, 1e-4)  # changes at which unmoved roots are counted

@@ -1,4 +1,4 @@
-"""All values of y at which roots of a polynomial in s meet or cross the imaginary axis, exactly.
+"""Finds all values of y at which roots of a polynomial in s meet or cross the imaginary axis, exactly.
 
 The coefficients are polynomials in y with rational coefficients. A root 0 occurs where aₙ(y) = 0, a root at infinity
 where a0(y) = 0, a pair ± iω where the resultant of the even and the odd part is 0, and a multiple root where the
@@ -211,7 +211,7 @@ def _is_marginal(split: _Split, y: Any) -> bool:
 
 
 def _find_events(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:
-    """The kind and the root of each crossing at y, and whether the root is rightmost; a mirrored real pair is none."""
+    """Kind, root and whether the root is rightmost, for each crossing at y. A mirrored real pair is no crossing."""
     if kind == "infinity":
         yield kind, Root(math.nan, 0.0), False
         return

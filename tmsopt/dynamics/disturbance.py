@@ -93,7 +93,7 @@ def parse_disturbance(system: System, arguments: Mapping[str, Any]) -> Disturban
 
 
 def _parse_angles(system: System, arguments: Mapping[str, Any]) -> tuple[dict[str, float], list[Fault]]:
-    """The angles at the start, and faults of these angles and of the amounts of pushes and noise."""
+    """The angles at the start, and the faults of the angles, pushes and noise."""
     faults, start = list[Fault](), dict[str, float]()
     for word, value in ((w, arguments[w]) for w in (*_ANGLE_NAMES, *_AMOUNTS) if arguments[w] is not None):
         if not system.impulses:

@@ -127,12 +127,10 @@ def growth(
     parameter_set, parameters, name = _find_parameter(design, over)
     model = design.problem.model
     has_critical = f"{name}_c" in model.quantity_names(parameter_set)
-    at, critical = (
-        parameters[name],
-        float(Values(model, parameter_set, parameters)[f"{name}_c"]) if has_critical else math.nan,
-    )
+    design_value = parameters[name]
+    critical = float(Values(model, parameter_set, parameters)[f"{name}_c"]) if has_critical else math.nan
     speed = name in SPEEDS
-    low, high = _default_range(design, name, end, at)
+    low, high = _default_range(design, name, end, design_value)
 
     def coefficients(x: Array) -> Array:
         """Of shape (n, degree + 1)."""
@@ -150,9 +148,9 @@ def growth(
         )
     crossings = user_crossings(model, crossings)
     if is_open:
-        high = _last_event(crossings.found, at)
+        high = _last_event(crossings.found, design_value)
     events = tuple(c for c in crossings.found if low < c.at < high)
-    centres = [at, *(c.at for c in events if "EP" in c.kind)]
+    centres = [design_value, *(c.at for c in events if "EP" in c.kind)]
     first = low + (high - low) / _GRID_POINTS if speed else low  # at rest a speed leaves roots 0
     grid = np.unique(
         np.concatenate([np.linspace(first, high, _GRID_POINTS), *(c + _DENSE_OFFSETS * (high - low) for c in centres)])
@@ -165,8 +163,7 @@ def growth(
     root_values = roots(c)
     if is_polynomial:
         stable, heavily_damped = (
-            _clip_bands(crossings.stable, low, high),
-            _clip_bands(crossings.heavily_damped, low, high),
+            _clip_bands(bands, low, high) for bands in (crossings.stable, crossings.heavily_damped)
         )
     else:
         is_inside = is_stable(c)
@@ -177,11 +174,13 @@ def growth(
         if parameter_set.rate is None
         else np.zeros(values.shape) + parameter_set.rate({**parameters, name: values})
     )
-    multiple_meetings = [c.at for c in events if _has_many_roots(c.kind)] + [at] * _has_many_roots(design.structure)
+    multiple_meetings = [c.at for c in events if _has_many_roots(c.kind)] + [design_value] * _has_many_roots(
+        design.structure
+    )
     modes = follow_modes(
         values,
         root_values,
-        at,
+        design_value,
         multiple_meetings,
         is_bicycle=is_bicycle(model) and model.degree == _BICYCLE_DEGREE,
         over_speed=speed,
@@ -196,7 +195,7 @@ def growth(
         values,
         root_values,
         critical,
-        at,
+        design_value,
         design.structure,
         stable,
         heavily_damped,
@@ -222,21 +221,21 @@ def _find_parameter(design: Solution, over: str | None) -> tuple[ParameterSet, d
     raise input_error(f"found '{over}'; {suggest(over, accepted)}", "over")
 
 
-def _default_range(design: Solution, name: str, end: float | None, at: float) -> Stretch:
+def _default_range(design: Solution, name: str, end: float | None, design_value: float) -> Stretch:
     if end is not None:
         return min(end, 0.0), max(end, 0.0)
     if name in SPEEDS:
-        return 0.0, 2 * max(at, 0.5)
-    low, high = design.problem.free.get(name, (min(2 * at, 0.0), max(2 * at, 0.0)))
+        return 0.0, 2 * max(design_value, 0.5)
+    low, high = design.problem.free.get(name, (min(2 * design_value, 0.0), max(2 * design_value, 0.0)))
     return (low, high) if low < high else (low - 1.0, high + 1.0)
 
 
-def _last_event(crossings: Sequence[Crossing], at: float) -> float:
+def _last_event(crossings: Sequence[Crossing], design_value: float) -> float:
     """The end of a range of speeds that shows all events."""
     last_crossing = max((c.at for c in crossings if c.kind in ("weave", "capsize", "infinity")), default=0.0)
-    shown_end = _FAR_RATIO * max(at, last_crossing, 0.5)
+    shown_end = _FAR_RATIO * max(design_value, last_crossing, 0.5)
     last = max((c.at for c in crossings if c.at <= shown_end), default=0.0)
-    return _END_RATIO * max(last, last_crossing, at) if last else 2 * max(at, 0.5)
+    return _END_RATIO * max(last, last_crossing, design_value) if last else 2 * max(design_value, 0.5)
 
 
 def _clip_bands(bands: Sequence[Stretch], low: float, high: float) -> tuple[Stretch, ...]:

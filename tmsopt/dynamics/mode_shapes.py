@@ -15,7 +15,7 @@ from tmsopt.records import Complex, Table, plain
 from tmsopt.roots import Root, Structure
 
 _DIGITS = 9  # printed digits of a shape; singular vectors have fewer correct digits than doubles
-_ZERO_AMPLITUDE = 1e-12  # amplitude, relative to the largest, below which there is no phase
+_ZERO_AMPLITUDE = 1e-12  # amplitude, relative to the largest, below which a coordinate has no phase
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class ModeShape:
         amplitudes: amplitude of each coordinate; the largest amplitude is 1.
         phases: phase lead over the first coordinate (lean) in degrees, from −180 to 180; nan for a coordinate at rest.
             For a complex H the argument of ψₖ/ψ₁, with motion as e^(−iωt).
-        eigenfrequency: ω = i s for a complex H, else None.
+        eigenfrequency: ω = i s for a complex H, otherwise None.
     """
 
     re: float

@@ -29,7 +29,7 @@ class Mode:
 
 @dataclass(frozen=True)
 class _Piece:
-    """A range with a constant number of real roots: the real roots ascending, then the pairs."""
+    """A range of values with a constant number of real roots: first the real roots, ascending, then the pairs."""
 
     values: Array
     roots: Complex
@@ -126,7 +126,7 @@ def _name_modes(part: _Piece, design: float, is_bicycle: bool) -> list[str]:
 
 
 def _pass_names(old_piece: _Piece, names: list[str], new_piece: _Piece, forward: bool) -> list[str]:
-    """Names of the next piece, from those of the previous one, if just two roots meet between them; else empty."""
+    """Names of the next piece, from the names of the previous piece; empty unless just two roots meet between them."""
     if abs(old_piece.real - new_piece.real) != 2:
         return []
     few_reals, many_reals = sorted((old_piece, new_piece), key=lambda piece: piece.real)

@@ -132,7 +132,7 @@ def simulate(
     """Simulate a design after a lean, a push of its handlebar or in noise; exact even where its roots meet.
 
     The motion is x(t) = e^(At) x(0) for the linear equations of the stored design, at evenly spaced times. At a
-    multiple root with a Jordan block the exponential contains the terms t^k e^(st). Rounding scatters the roots of an
+    multiple root with a Jordan block the exponential contains the terms t^k e^(st). Rounding moves the roots of an
     exceptional point, but changes e^(At) only by the size of the rounding. Peaks and settling times belong to the exact
     motion, not to the times shown.
 

@@ -1,4 +1,4 @@
-"""All critical speeds of a bicycle: weave, capsize, and speeds at which roots meet."""
+"""Finds all critical speeds of a bicycle: weave speeds, capsize speeds, and speeds at which roots meet."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Evaluates a design from its parameters alone, without trusting a solver.
+"""Evaluates a design from its parameters only, without trusting a solver.
 
 Input: a problem and a design. Output: objective and violations, worst case, bounds that need no search, proofs over
 bands, certified digits, and the laws that the design obeys. Open `recheck` first.

@@ -2,7 +2,7 @@
 
 The product of the roots is ±aₙ/a0. So the abscissa is at least ω0 = −|aₙ/a0|^(1/n), for any other coefficients.
 
-A relation Σ b_k a_k = 0 that holds for all free parameters gives a bound too. If no root is right of γ, the
+A relation Σ b_k a_k = 0 that holds for all free parameters also gives a bound. If no root is right of γ, the
 coefficients of p(t + γ) all have the sign of a0 or are 0. With h(z) = Σ b_k C(n, k) z^k, the relation multiplies the
 coefficient of t^(n−i) by (n − i)! h⁽ⁱ⁾(−γ). The relation cannot hold if h and all its derivatives have the same sign at
 −γ. So the abscissa is at least −z, where z is the largest real zero of h and its derivatives. If z is a zero of h
@@ -170,7 +170,7 @@ def _restrict_to_line(outer: Formula, point: Sequence[float], name: str) -> tupl
 
 
 def _extremes_along(outer: Formula, corner: Sequence[float], name: str, *ends: float) -> list[tuple[float, ...]]:
-    """The ends and stationary points along the nonlinear parameter from a corner; empty if there is a pole."""
+    """The ends and stationary points along the nonlinear parameter from a corner; empty if the line has a pole."""
     first, _, turning = _restrict_to_line(outer, corner, name)
     poles, turning_points = (
         [z.real for z, _ in p.complex_roots() if z.imag == 0 and not (z.real < ends[0] or z.real > ends[1])]

@@ -1,4 +1,4 @@
-"""Proves by interval arithmetic that no design in the box meets the limits."""
+"""Proves by interval arithmetic that no design in the box satisfies the limits."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Evaluates a design from its parameters alone, independently of the program that produced it."""
+"""Evaluates a design from its parameters only, independently of the program that produced it."""
 
 import math
 from collections.abc import Mapping, Sequence

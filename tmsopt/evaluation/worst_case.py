@@ -212,7 +212,7 @@ def _is_left_of(problem: Posed, parameters: Numbers, box: _Box, gamma: Any) -> b
     at_middle = tests(middle)
     if not all(test > 0 for test in at_middle):
         return False
-    # The error of the mean value form f(m) + Σ ∂f/∂x (x − m) is the width squared; that of f(x) is the width.
+    # The error of the mean value form f(m) + Σ ∂f/∂x (x − m) is the width squared; the error of f(x) is the width.
     for side, ends in box.items():
         if ends[0] < ends[1]:
             move = ball(ends) - middle[side][0]
@@ -222,5 +222,5 @@ def _is_left_of(problem: Posed, parameters: Numbers, box: _Box, gamma: Any) -> b
 
 
 def _series_term(test: Any, order: int) -> Any:
-    """The value (order 0) or slope (order 1) of a series; the slope of a ball is 0."""
+    """The value (order 0) or slope (order 1) of a series; the slope of an interval is 0."""
     return test[order] if isinstance(test, flint.arb_series) else flint.arb(0) if order else test

@@ -43,7 +43,7 @@ class Curve:
 
     Attributes:
         scale: units of the variables.
-        lower, upper: limits of y, infinite where there are none.
+        lower, upper: limits of y; infinite without a limit.
         evaluate: y → F and its Jacobian in y.
         advance: (y, t, s, origin) → next y, next t, and the numbers by which `follow` accepts the step. None for more
             than n equations.
@@ -58,7 +58,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """A point y of a curve, in units of the scale, and the unit tangent t there, both of shape (n + 1,)."""
+    """A point y of a curve, in units of the scale, and the unit tangent t at the point, both of shape (n + 1,)."""
 
     y: Array
     t: Array

@@ -22,7 +22,7 @@ _EP4_DISTANCE = 1e-3  # distance within which an EP4 is searched near an EP3 and
 _LOW_MARK = 1e-2  # mark below which the marks may touch 0 nearby, because they grow with the square of a step of 0.1
 _EP4_RESIDUAL = 1e-13  # relative mismatch of a coefficient at an EP4: a few roundings
 _SAME_DESIGN = 1e-6
-"""Like `SAME_PLACE`, but for the free parameters only. Where the equations are singular, the unknowns scatter."""
+"""Like `SAME_PLACE`, but for the free parameters only. Where the equations are singular, the unknowns are inexact."""
 _MAX_RESIDUAL = 1e-6  # largest mismatch of a coefficient at a point of a branch
 
 _SQUARE_TOLERANCE = 1e-9  # relative difference of c from b²/4 below which a quadratic factor has a double root
@@ -30,7 +30,7 @@ _SQUARE_TOLERANCE = 1e-9  # relative difference of c from b²/4 below which a qu
 _EP4 = Event("EP4", lambda points: points.residual)  # located by equations of its own
 
 RowEvent = tuple[int, Event]
-"""A row of a walk and the event there."""
+"""A row of a walk, and the event at this row."""
 
 
 def make_branches(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Iterator[Branch]:
@@ -66,7 +66,7 @@ def find_events(traced: TracedProblem, walk: Walk, events: Sequence[Event]) -> t
 def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent]) -> Branch:
     """A walk as a branch in the parameters of the problem."""
     problem, pattern, points = traced.problem, traced.pattern, Points(traced, walk.y, walk.t)
-    if pattern.unknowns[-2:] == ("b", "c"):  # a double root of a factor would scatter by 1e-8
+    if pattern.unknowns[-2:] == ("b", "c"):  # rounding would move a double root of a factor by 1e-8
         b, c = (points.x[:, traced.unknowns.stop - k] for k in (2, 1))
         for row in {row for row, event in row_events if "EP" in event.name}:
             c[row] = b[row] ** 2 / 4 if abs(b[row] ** 2 / 4 - c[row]) <= _SQUARE_TOLERANCE * abs(c[row]) else c[row]
@@ -79,7 +79,7 @@ def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent
     residual, columns = points.residual, points.parameters
     event_rows = [(row, event.name, event.detail) for row, event in row_events]
     for row, end in () if walk.closed else zip((0, len(points) - 1), walk.ends, strict=True):
-        # where roots meet but eigenvectors do not, the curve is singular
+        # where roots coincide but eigenvectors do not, the curve is singular
         is_crossed = end.reason == SINGULAR and is_crossing(problem, pattern, table_at(columns, row))
         event_rows.append((row, "end", CROSSING if is_crossed else describe_end(traced, end)))
     event_points = [

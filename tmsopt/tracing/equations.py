@@ -63,7 +63,7 @@ class TracedProblem:
 
 
 def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracedProblem:
-    """Compile the equations of a pattern, by default the one that the problem locates."""
+    """Compile the equations of a pattern; by default the pattern that the problem locates."""
     pattern, free = pattern or pattern_of(problem.model, str(problem.locate)), len(problem.free)
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
     nlp = formulate_matching(problem.derive(constraints=equalities), pattern)

@@ -75,7 +75,7 @@ class LocatedEvent:
 
 
 def check_events(events: Any) -> list[Event]:
-    """The events of a user as functions of many `Points`, like those of the package.
+    """The events of a user as functions of many `Points`, as the events of the package are.
 
     Raises:
         InputError: if this is no list of events. Later, the functions raise it if a user's function raises or returns
@@ -212,23 +212,19 @@ def refine_walk(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ())
     minima: dict[tuple[int, float], LocatedEvent] = {}
     for event, value in _list_active(Points(traced, walk.y, walk.t), events):
         side = np.sign(value[1:-1])
-        value_before, height_here, value_after = side * value[:-2], side * value[1:-1], side * value[2:]
+        value_before, value_here, value_after = side * value[:-2], side * value[1:-1], side * value[2:]
         with np.errstate(all="ignore"):  # slope and second derivative of the parabola through three values
-            slope_before, slope_after = (
-                (height_here - value_before) / step_before,
-                (value_after - height_here) / step_after,
-            )
-            slope, bend = (
-                (slope_before * step_after + slope_after * step_before) / (step_before + step_after),
-                2 * (slope_after - slope_before) / (step_before + step_after),
-            )
+            slope_before = (value_here - value_before) / step_before
+            slope_after = (value_after - value_here) / step_after
+            slope = (slope_before * step_after + slope_after * step_before) / (step_before + step_after)
+            bend = 2 * (slope_after - slope_before) / (step_before + step_after)
             dips = (
-                (height_here <= value_before)
-                & (height_here <= value_after)
+                (value_here <= value_before)
+                & (value_here <= value_after)
                 & (bend > 0)
-                & (slope**2 / (2 * bend) > _MIN_DIP * height_here)
+                & (slope**2 / (2 * bend) > _MIN_DIP * value_here)
             )
-        for k in np.flatnonzero(dips & (step_before > 0) & (step_after > 0) & (height_here > 0)).tolist():
+        for k in np.flatnonzero(dips & (step_before > 0) & (step_after > 0) & (value_here > 0)).tolist():
             row = walk.y[[k + 1]], walk.t[[k + 1]]
 
             def height(s: float, event: Event = event, row: tuple[Array, Array] = row, sign: float = side[k]) -> float:

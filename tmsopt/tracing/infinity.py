@@ -1,4 +1,4 @@
-"""The curves a0 = 0 in a plane, where a root goes through infinity, and the other roots along them.
+"""Finds the curves a0 = 0 in a plane, where a root goes through infinity, and the other roots along these curves.
 
 On one side of such a curve a large root is negative, on the other side it is positive. The curve bounds stability where
 the other roots are stable. It bounds heavy damping where they are real and negative.
@@ -40,7 +40,7 @@ class InfinityCurve:
         stable: for each of the n - 1 segments, whether it bounds stability.
         heavily_damped: whether the segment bounds heavy damping.
         parting: whether the segment separates capsize from weave.
-        changes: row → the change of the other roots there: ``capsize``, ``weave``, ``EP2`` or a second ``infinity``.
+        changes: row → the change of the other roots at this row: ``capsize``, ``weave``, ``EP2`` or ``infinity``.
     """
 
     parameters: dict[str, Array]
@@ -85,7 +85,7 @@ def _describe_curve(problem: Posed, curve: Curve, walk: Walk, other_coefficients
         return map_rows(other_coefficients, y * curve.scale)[0]
 
     def tests(y: Array) -> list[tuple[str, Array]]:
-        """Functions whose zeros are changes of the other roots, each with the name of the change."""
+        """Functions that are 0 where the other roots change, each with the name of the change."""
         v = values(y)
         c = list(v[:, : -2 if constant_vanishes else -1].T)
         named_functions = [("weave" if k else "capsize", value) for k, value in enumerate(axis_functions(c))]

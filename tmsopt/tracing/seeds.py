@@ -1,4 +1,4 @@
-"""Points on the curves of a pattern: from many designs, from a grid over two parameters, and from beyond infinity."""
+"""Finds points on the curves of a pattern: from many designs, from a grid, and where curves return from infinity."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, cycle, islice
@@ -123,14 +123,15 @@ def _grid_test(traced: TracedProblem) -> Callable[[Sequence[Any]], Any] | None:
 
 
 def find_missed(traced: TracedProblem, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
-    """Points of curves that are not walked yet, where a test function of the pattern changes sign on a grid."""
-    if test := _grid_test(traced):
-        for design in find_unexplained(traced.problem, traced.curve, test, walks):
-            yield 0, _project_designs(traced, [design])[0]
+    """Points of curves that are not walked yet: near sign changes on a grid, and where curves return from infinity."""
+    test = _grid_test(traced)
+    missed = find_unexplained(traced.problem, traced.curve, test, walks) if test else ()
+    for design in chain(missed, _list_designs_beyond_infinity(traced, walks)):
+        yield 0, _project_designs(traced, [design])[0]
 
 
-def find_beyond_infinity(traced: TracedProblem, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
-    """Points where a curve may return from infinity, where a root goes from −∞ to +∞ or back.
+def _list_designs_beyond_infinity(traced: TracedProblem, walks: Sequence[Walk]) -> Iterator[dict[str, Any]]:
+    """Designs near which a curve may return from infinity, where a root goes from −∞ to +∞ or back.
 
     The distance of the parameters from a0 = 0 is proportional to the inverse of the unknown that grows. So two points
     give the limit and a point on its other side.
@@ -146,7 +147,7 @@ def find_beyond_infinity(traced: TracedProblem, walks: Sequence[Walk]) -> Iterat
                 (near_point, far_point), weight = (y[row, :free], y[-1, :free]), size[row] / size[-1]
                 limit = (far_point - weight * near_point) / (1 - weight)
                 x = (2 * limit - near_point) * traced.curve.scale[:free]
-                yield 0, _project_designs(traced, [design_at(traced.problem, x)])[0]
+                yield design_at(traced.problem, x)
 
 
 def _project_designs(

@@ -71,7 +71,7 @@ def find_zeros(function: Callable[[Array], Array], ends: Array) -> Array:
             break
         x = a + share * (b - a)
         fx = function(x)
-        same_sign = np.sign(fx) == np.sign(fa)  # a is the newest point, c the one before it
+        same_sign = np.sign(fx) == np.sign(fa)  # a is the newest point, c the point before it
         c, fc = np.where(same_sign, a, b), np.where(same_sign, fa, fb)
         b, fb = np.where(same_sign, b, a), np.where(same_sign, fb, fa)
         a, fa = x, fx

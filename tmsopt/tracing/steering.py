@@ -28,7 +28,7 @@ def continue_from(
 
     Args:
         problem: as for `trace`. For a solution, the curve begins at its parameters.
-        pattern: name; by default the one that the problem locates.
+        pattern: name of the pattern; by default the pattern that the problem locates.
         through: a design near which the curve begins, with a value for every free parameter. The default is the
             parameters of a solution, or the first design from which the search of `trace` finds a point.
         step: longest step, in widths of the box.

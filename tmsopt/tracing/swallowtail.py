@@ -28,7 +28,7 @@ from tmsopt.tracing.solving import find_zeros
 from tmsopt.tracing.trace import STARTS, trace
 
 Cut = tuple[float, str]
-"""A double root and the kind of edge there: of the surface, or of the box."""
+"""A double root, and the kind of the edge at this root: an edge of the surface or of the box."""
 
 AffineCoefficients = tuple[Array, Array, Array]
 """Coefficients A, B, C of a polynomial A + x B + y C, where x and y are the last two variables."""
@@ -39,7 +39,7 @@ _SCAN_POINTS = 2000  # double roots r at which edges are searched
 _SAME_ROW = 1e-12  # distance, in widths of the box, up to which two rows count as one
 _OFFSETS = np.array([1e-7, 4e-5, 1e-4, 1e-3, 4e-3, 0.012])
 _ROWS_AROUND = np.concatenate([-_OFFSETS[::-1], _OFFSETS])
-"""Rows on either side of a value of Fr where the number of edges changes."""
+"""Distances of additional rows from a value of Fr at which the number of edges changes."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Swallowtail(Printable):
     Attributes:
         axes: the three free parameters; rows of patches have one value of the first.
         cusps: traced EP3 curves, the cuspidal edges.
-        crossing: the traced EP set, 2EP2 on the self-intersection of the surface and CEP2 beyond it.
+        crossing: the traced EP set: 2EP2 where the surface intersects itself, and CEP2 on the rest of the curve.
 
     Example:
         >>> surface = tmsopt.swallowtail("problems/ep_set.toml", rows=4, across=4, starts=8)

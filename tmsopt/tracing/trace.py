@@ -31,7 +31,7 @@ from tmsopt.tracing.continuation import Walk
 from tmsopt.tracing.description import make_branches
 from tmsopt.tracing.equations import prepare_tracing
 from tmsopt.tracing.events import Event, check_events
-from tmsopt.tracing.seeds import find_beyond_infinity, find_missed, find_seeds, walk_new_curves
+from tmsopt.tracing.seeds import find_missed, find_seeds, walk_new_curves
 
 STARTS = 48
 STEP = 0.005
@@ -60,7 +60,7 @@ def trace(
             Otherwise the search ends when this many designs in a row find no new branch, and it can miss a branch that
             is far from all of them.
         most: largest number of points of a branch in one direction.
-        through: points in the box (values of every free parameter) to begin at, before the others.
+        through: points in the box (values of every free parameter) from which the search begins.
         events: events to locate in addition to the built-in ones.
         progress: function called with a `tmsopt.Progress` now and then.
 
@@ -87,8 +87,7 @@ def trace(
 
     def points() -> Iterator[list[Array]]:
         nonlocal tried_starts
-        first_seeds = find_seeds(traced, starts, seed, through, walks)
-        for count, seeds in chain(first_seeds, find_missed(traced, walks), find_beyond_infinity(traced, walks)):
+        for count, seeds in chain(find_seeds(traced, starts, seed, through, walks), find_missed(traced, walks)):
             tried_starts = max(tried_starts, count)
             if steps:
                 steps(tried_starts, max(tried_starts, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
