@@ -183,8 +183,7 @@ def test_a_point_where_the_equations_leave_more_than_a_curve_is_no_start():
 
 def test_a_curve_in_an_edge_of_the_box_is_followed():
     """y (1 + x²) = 0 with y ≥ 0: rounding on the wrong side of the edge does not end it."""
-    x = ca.SX.sym("x", 2)
-    on = compile_curve(x, x[1] * (1 + x[0] ** 2), np.ones(2), np.array([-1.0, 0.0]), np.array([1.0, 1.0]))
-    walked = walk_both_ways(on, np.array([0.1, -1e-17]), 0.05, 500)
+    on = plane(lambda x, y: y * (1 + x**2), lower=[-1, 0], upper=[1, 1])
+    walked = follow_from(on, [0.1, -1e-17], 0.05)
     assert sorted(walked.y[[0, -1], 0]) == [-1, 1]
     assert np.abs(walked.y[:, 1]).max() < 1e-15
