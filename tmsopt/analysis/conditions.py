@@ -61,14 +61,13 @@ def evaluate_conditions(program: LocalProgram) -> Conditions:
         bounded_multipliers = lsq_linear(unit.T, target, bounds=(lower_bounds, np.inf), method="bvls", tol=1e-14).x
         residual_gradient = target - unit.T @ bounded_multipliers
         if np.linalg.norm(residual_gradient) > STATIONARY:
-            downhill = (
-                -residual_gradient * program.sizes
-            )  # the gradient minus its projection onto the cone of multipliers
+            # the gradient minus its projection onto the cone of multipliers
+            downhill = -residual_gradient * program.sizes
         y = y if independent else bounded_multipliers
     residual = float(np.linalg.norm(target - unit.T @ y))
     multipliers, firm = y * steepness / lengths, ~signed | (y > POSITIVE)
     if not downhill.any():
-        curvature, direction = _curvature(program, multipliers, unit[firm], steepness)
+        curvature, direction = _compute_curvature(program, multipliers, unit[firm], steepness)
         downhill = direction * program.sizes if curvature < -_MIN_CURVATURE else downhill
     return Conditions(multipliers, y, residual, independent, downhill, curvature, firm)
 
@@ -78,7 +77,7 @@ def curvature_sign(curvature: float) -> int:
     return int(curvature > _MIN_CURVATURE) - int(curvature < -_MIN_CURVATURE)
 
 
-def _curvature(program: LocalProgram, multipliers: Array, firm: Array, steepness: float) -> tuple[float, Array]:
+def _compute_curvature(program: LocalProgram, multipliers: Array, firm: Array, steepness: float) -> tuple[float, Array]:
     """Smallest curvature in the null space of the firm rows, relative to the largest or to the slope; its direction."""
     _, lengths, directions = np.linalg.svd(firm)
     free = directions[np.sum(lengths > _RANK * lengths.max(initial=0.0)) :].T  # columns: a basis of the null space

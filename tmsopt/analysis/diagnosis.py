@@ -67,7 +67,7 @@ class Diagnosis(Printable):
             **plain(self, "distance", digits=6),
             "responses": [
                 {"parameter": r.parameter, "change": "relative" if r.relative else "absolute"}
-                | {"unmoved": r.unmoved, "unresolved": r.unresolved, "laws": [_law(law) for law in r.laws]}
+                | {"unmoved": r.unmoved, "unresolved": r.unresolved, "laws": [_law_to_json(law) for law in r.laws]}
                 for r in self.responses
             ],
         }
@@ -143,7 +143,7 @@ def diagnose_roots(
             verdict = exact if as_stored and exact and exact.geometric == as_stored.geometric else as_stored
             partial = verdict.partial if verdict else (k,)
             kind = "semisimple" if g == k else "defective" if g == 1 else "partly defective"
-            ordered = tuple(sorted((compute_response(point, name) for name in parameter_set.names), key=_sensitivity))
+            ordered = tuple(sorted((compute_response(point, name) for name in parameter_set.names), key=_rank_response))
             s = midpoint(point.s)
             omega = (complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, k)]))
             distance = structure.distance
@@ -151,12 +151,12 @@ def diagnose_roots(
     return tuple(diagnoses)
 
 
-def _sensitivity(answer: Response) -> tuple[float, float]:
+def _rank_response(answer: Response) -> tuple[float, float]:
     first = answer.laws[0].branches if answer.laws else None
     return (float(first.exponent), -first.size) if first else (math.inf, 0.0)
 
 
-def _law(law: Law) -> dict[str, Any]:
+def _law_to_json(law: Law) -> dict[str, Any]:
     b = law.branches
     return {
         "roots": b.roots,

@@ -138,7 +138,7 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
     solution = solve_if_needed(design, progress)
     start_steps(progress, "judging the optimum")
     try:
-        problem = _problem_to_judge(solution)
+        problem = _choose_problem(solution)
         program = build_program(problem, solution)
     except NotCovered as error:
         return Optimality(NOT_COVERED, str(error))
@@ -147,7 +147,7 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
     if not conditions.downhill.any() and not weight > POSITIVE:
         return Optimality(NOT_COVERED, "the objective does not decrease with the abscissa")
     better = find_better_design(program, conditions, solution) if conditions.downhill.any() else None
-    verdict, order, reason = _verdict(solution, program, conditions, better)
+    verdict, order, reason = _judge(solution, program, conditions, better)
     stationary = conditions.residual <= STATIONARY
     unknowns, count = _count_unknowns(program)
     return Optimality(
@@ -155,8 +155,8 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
         reason=reason,
         order=order,
         goal=problem.goal,
-        roots=_rightmost_roots(program, conditions) if stationary else (),
-        limits=Table(_limit_gains(solution, program, conditions) if stationary else {}),
+        roots=_list_rightmost_roots(program, conditions) if stationary else (),
+        limits=Table(_compute_limit_gains(solution, program, conditions) if stationary else {}),
         unknowns=unknowns,
         conditions=count,
         residual=conditions.residual,
@@ -167,7 +167,7 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
     )
 
 
-def _problem_to_judge(solution: Solution) -> Posed:
+def _choose_problem(solution: Solution) -> Posed:
     """The problem of which the design may be an optimum.
 
     Raises:
@@ -204,7 +204,7 @@ def _problem_to_judge(solution: Solution) -> Posed:
     return problem
 
 
-def _verdict(
+def _judge(
     solution: Solution, program: LocalProgram, conditions: Conditions, better: BetterDesign | None
 ) -> tuple[str, int, str]:
     """The verdict, the order of the derivatives that decide it, and the verdict in a sentence."""
@@ -276,7 +276,7 @@ def _describe_better_design(solution: Solution, better: BetterDesign) -> str:
     return f"{', '.join(parts)} gives {better.value:.6g}"
 
 
-def _rightmost_roots(program: LocalProgram, conditions: Conditions) -> tuple[RightmostRoot, ...]:
+def _list_rightmost_roots(program: LocalProgram, conditions: Conditions) -> tuple[RightmostRoot, ...]:
     """The roots on the rightmost line with their multipliers."""
     rightmost_roots, rows = [], list(zip(program.rows, conditions.multipliers.tolist(), strict=True))
     model = program.problem.model
@@ -296,7 +296,7 @@ def _rightmost_roots(program: LocalProgram, conditions: Conditions) -> tuple[Rig
     return tuple(rightmost_roots)
 
 
-def _limit_gains(solution: Solution, program: LocalProgram, conditions: Conditions) -> Mapping[str, float]:
+def _compute_limit_gains(solution: Solution, program: LocalProgram, conditions: Conditions) -> Mapping[str, float]:
     """Gain of the objective per unit of relaxation; for an equality, per unit that is added to the right-hand side."""
     problem, limits = program.problem, dict[str, float]()
     for h, y, firm in zip(program.rows, conditions.multipliers.tolist(), conditions.firm, strict=True):

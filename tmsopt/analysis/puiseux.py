@@ -56,7 +56,7 @@ def find_branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, .
     points = [(j, m) for j, m in first.items() if m is not None]
     hull: list[tuple[int, int]] = []
     for j, m in points:  # lower convex hull from left to right
-        while len(hull) > 1 and _slope(hull[-2], hull[-1]) >= _slope(hull[-2], (j, m)):
+        while len(hull) > 1 and _compute_slope(hull[-2], hull[-1]) >= _compute_slope(hull[-2], (j, m)):
             hull.pop()
         hull.append((j, m))
     branches = []
@@ -64,11 +64,11 @@ def find_branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, .
         width, drop = j2 - j1, m1 - m2
         q = width // gcd(width, drop)
         polynomial = [complex(terms[m1 - i * q * drop // width][j1 + i * q]) for i in reversed(range(width // q + 1))]
-        branches.append(Branches(width, drop * q // width, q, _roots(np.array(polynomial))))
+        branches.append(Branches(width, drop * q // width, q, _find_edge_roots(np.array(polynomial))))
     return tuple(sorted(branches, key=lambda b: b.exponent)), hull[0][0] if hull else k
 
 
-def _roots(polynomial: NDArray[np.complex128]) -> tuple[complex, ...]:
+def _find_edge_roots(polynomial: NDArray[np.complex128]) -> tuple[complex, ...]:
     """Roots of the polynomial of an edge; if it is the power of a linear polynomial, the mean of its roots, k times."""
     k = len(polynomial) - 1
     mean = -polynomial[1] / (k * polynomial[0])
@@ -79,5 +79,5 @@ def _roots(polynomial: NDArray[np.complex128]) -> tuple[complex, ...]:
     return tuple(complex(z) for z in np.roots(polynomial))
 
 
-def _slope(a: tuple[int, int], b: tuple[int, int]) -> Fraction:
+def _compute_slope(a: tuple[int, int], b: tuple[int, int]) -> Fraction:
     return Fraction(b[1] - a[1], b[0] - a[0])

@@ -21,11 +21,8 @@ _NEAR_ZERO = 1e-3  # share of a range below which a parameter may be a rounded 0
 _ZERO = 1e-12  # share of a size below which a parameter changes absolutely, not relatively
 _MAX_MOVE = 0.01  # largest move of a parameter, relative to its size; a point farther away is another point
 _MAX_RATIO = 0.9  # ratio of successive residuals above which the iteration ends
-_RANKS = (
-    1e-3,
-    1e-7,
-    1e-12,
-)  # relative singular values below which directions are dropped; the best of the three counts
+# relative singular values below which directions are dropped; the best of the three counts
+_RANKS = (1e-3, 1e-7, 1e-12)
 _CONVERGED = 2.0**-200  # relative residual of conditions that hold to all digits
 _STEP_ERROR = 4  # error of the result relative to the last step, also for singular conditions
 
@@ -145,7 +142,7 @@ def refine_root(
         return characteristic_polynomial([[-x for x in row] for row in negative])
 
     point = RootPoint(polynomial, values, doubt, sizes, widths, flint.acb(s), multiplicity, real)
-    return _improve(replace(point, unit=max(_root_bound(point), abs(s)) or 1.0))
+    return _improve_point(replace(point, unit=max(_bound_roots(point), abs(s)) or 1.0))
 
 
 def refine_point(point: RootPoint, geometric: int) -> RootPoint:
@@ -155,23 +152,23 @@ def refine_point(point: RootPoint, geometric: int) -> RootPoint:
     independent eigenvectors, all mixed derivatives of p in s and a parameter of an order below g are also 0.
     """
     names = [n for n, size in point.sizes.items() if size > 0]
-    refined_point = _improve(replace(point, geometric=geometric, refined_names=[n for n in names if n in point.free]))
-    return (
-        refined_point if refined_point.residual < _CONVERGED else _improve(replace(refined_point, refined_names=names))
-    )
+    free_names = [n for n in names if n in point.free]
+    point = _improve_point(replace(point, geometric=geometric, refined_names=free_names))
+    return point if point.residual < _CONVERGED else _improve_point(replace(point, refined_names=names))
 
 
-def _improve(start: RootPoint) -> RootPoint:
+def _improve_point(start: RootPoint) -> RootPoint:
     """Refine the root, and the parameters in `refined_names`, until the conditions hold or stop improving."""
     best_point, lead = start, abs(start.expand()[start.multiplicity]).mid()
-    residuals = _conditions(best_point, lead)
-    largest = _norm(residuals)
+    residuals = _evaluate_conditions(best_point, lead)
+    largest = _find_largest(residuals)
     while 2.0 ** (-2 * _BITS // 3) < largest < np.inf:
         candidates = []
-        for step in _steps(best_point, residuals, lead):
+        for step in _list_steps(best_point, residuals, lead):
             point = _apply_step(best_point, step)
             if all(abs(point.values[n] - start.values[n]) <= _MAX_MOVE * start.sizes[n] for n in start.refined_names):
-                candidates.append((_norm(new_residuals := _conditions(point, lead)), point, new_residuals, step))
+                new_residuals = _evaluate_conditions(point, lead)
+                candidates.append((_find_largest(new_residuals), point, new_residuals, step))
         new_largest, point, new_residuals, step = min(
             candidates, key=lambda each: each[0], default=(largest, best_point, residuals, [])
         )
@@ -181,16 +178,12 @@ def _improve(start: RootPoint) -> RootPoint:
         doubt = {n: max(_ROUNDING, lengths.get(n, 0.0)) * x for n, x in start.sizes.items()}
         width = max(_ROUNDING, _STEP_ERROR * float(abs(step[-1])), float(new_largest))
         best_point, largest, residuals = replace(point, doubt=doubt, width=width), new_largest, new_residuals
-    parts, rounding = (
-        (best_point.s.real, best_point.s.imag),
-        best_point.unit * best_point.width,
-    )  # parts within rounding of 0 become 0
-    return replace(
-        best_point, residual=float(largest), s=flint.acb(*(flint.arb(0) if abs(x) <= rounding else x for x in parts))
-    )
+    rounding, s = best_point.unit * best_point.width, best_point.s
+    parts = (flint.arb(0) if abs(x) <= rounding else x for x in (s.real, s.imag))  # parts within rounding become 0
+    return replace(best_point, residual=float(largest), s=flint.acb(*parts))
 
 
-def _conditions(point: RootPoint, lead: Any) -> list[Any]:
+def _evaluate_conditions(point: RootPoint, lead: Any) -> list[Any]:
     """Relative residuals of the conditions. Without parameters to refine, the root is the mean of the nearby roots."""
     k, g = point.multiplicity, point.geometric
     residuals = point.expand()[0 if point.refined_names else k - 1 : k]
@@ -201,13 +194,13 @@ def _conditions(point: RootPoint, lead: Any) -> list[Any]:
     return [x / lead for x in residuals]
 
 
-def _steps(point: RootPoint, residuals: Sequence[Any], lead: Any) -> Iterator[list[Any]]:
+def _list_steps(point: RootPoint, residuals: Sequence[Any], lead: Any) -> Iterator[list[Any]]:
     """Least-squares steps: parameters relative to their sizes, then the root in its unit."""
     small_step, count = flint.arb(2) ** (-_BITS // 3), len(point.refined_names)
     size = max(abs(x) for x in residuals).mid()
     columns = []
     for shift in np.eye(count + 1).tolist():
-        residuals_ahead = _conditions(_apply_step(point, [small_step * x for x in shift]), lead)
+        residuals_ahead = _evaluate_conditions(_apply_step(point, [small_step * x for x in shift]), lead)
         columns.append([(a - b) / small_step for a, b in zip(residuals_ahead, residuals, strict=True)])
     if not point.real:
         columns.append([flint.acb(0, 1) * x for x in columns[-1]])
@@ -227,7 +220,7 @@ def _apply_step(point: RootPoint, step: Sequence[Any]) -> RootPoint:
     return replace(point, values={**point.values, **new_values}, s=flint.acb(s.real.mid(), s.imag.mid()))
 
 
-def _root_bound(point: RootPoint) -> float:
+def _bound_roots(point: RootPoint) -> float:
     """A bound on the size of the roots, also after a change of any parameter by half its size."""
     polynomials = (
         point.polynomial(point.values),
@@ -237,7 +230,7 @@ def _root_bound(point: RootPoint) -> float:
     return max(filter(np.isfinite, ratios), default=0.0)
 
 
-def _norm(residuals: Sequence[Any]) -> Any:
+def _find_largest(residuals: Sequence[Any]) -> Any:
     sizes = [abs(x) for x in residuals]
     return max((x.mid() for x in sizes), default=flint.arb(0)) if all(x.is_finite() for x in sizes) else np.inf
 

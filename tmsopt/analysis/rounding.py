@@ -77,7 +77,7 @@ def round_design(solution: Solution, choices: Sequence[tuple[Sequence[str], int]
             units = {n: unit_of(problem, n) for n in names}
             written = {n: _format_decimal(solution, n, unit, digits) for n, unit in units.items()}
             design = {**solution.parameters, **{n: _parse_exact(text, units[n]) for n, text in written.items()}}
-            values, violated = recheck_exactly(problem, design, _cases(solution, design))
+            values, violated = recheck_exactly(problem, design, _list_cases(solution, design))
             abscissa, roots = float(values["abscissa"]), values["structure"].roots
             has_ratio = sum(r.multiplicity for r in roots) == problem.model.degree and problem.model.carrier is None
             row = RoundedDesign(
@@ -87,13 +87,13 @@ def round_design(solution: Solution, choices: Sequence[tuple[Sequence[str], int]
                 loss=abscissa - solution.abscissa,
                 damping_ratio=float(values["damping_ratio"]) if has_ratio else math.nan,  # not with a root at infinity
                 objective=float(problem.objective(values)) if problem.objective else math.nan,
-                violations=Table(violated | _range_violations(problem, design)),
+                violations=Table(violated | _find_range_violations(problem, design)),
             )
             rounded_designs.append(row)
     return tuple(rounded_designs)
 
 
-def _cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
+def _list_cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
     """The listed cases, the worst case of the unrounded design, and the worst cases of the rounded design."""
     problem = solution.problem.posed
     cases = [*problem.cases, *filter(None, [solution.worst])]
@@ -102,7 +102,7 @@ def _cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
     return cases
 
 
-def _range_violations(problem: Posed, design: Mapping[str, Any]) -> dict[str, float]:
+def _find_range_violations(problem: Posed, design: Mapping[str, Any]) -> dict[str, float]:
     """Ends of ranges that a design exceeds → the amount."""
     return {
         f"{name}.{end}": amount

@@ -43,7 +43,7 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
             return "no design meets all limits"
         statement = "no design is stable (proved); " if solution.any_stable is False else ""
         advice = not_covered or _advise_certify(bound, "--certify looks for a proof")
-        return _append(f"{statement}infeasibility is not proved{_search_effort(bound)}", advice)
+        return _append_advice(f"{statement}infeasibility is not proved{_search_effort(bound)}", advice)
     if not problem.free:
         return "nothing is free, so there is no optimum to prove; tmsopt prove proves the roots"
     if not text:
@@ -60,11 +60,11 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
         unit = common_unit(problem, text)
         value, gap = unit.show(bound.value, 6), unit.show(bound.gap, 2)
         statement = (
-            f"{no_design(problem)} is {_side(problem)} {value} ({bound.method}), gap {gap}{_search_effort(bound)}"
+            f"{no_design(problem)} is {_bound_side(problem)} {value} ({bound.method}), gap {gap}{_search_effort(bound)}"
         )
-        return _append(statement, not_covered or _advise_certify(bound, "--certify tries to close it"))
+        return _append_advice(statement, not_covered or _advise_certify(bound, "--certify tries to close it"))
     advice = not_covered or _advise_certify(bound, "--certify looks for a proof or a better design")
-    return _append(f"not proved to be the best{_search_effort(bound)}", advice)
+    return _append_advice(f"not proved to be the best{_search_effort(bound)}", advice)
 
 
 def bound_lines(solution: Solution) -> list[str]:
@@ -78,7 +78,7 @@ def bound_lines(solution: Solution) -> list[str]:
         return [f"proved: no design satisfies all constraints ({how})"] if bound.proven else []
     if not math.isfinite(bound.value):
         return [f"bound: none found in time ({search})"] if bound.seconds else []
-    which = f"{no_design(problem)} is {_side(problem)} {Unit().number(bound.value, _DIGITS)}"
+    which = f"{no_design(problem)} is {_bound_side(problem)} {Unit().number(bound.value, _DIGITS)}"
     lines = [f"bound: {which} ({bound.method}); gap {bound.gap:.1e}"]
     if bound.method == bound.solver.lower():
         lines.append(f"how: {search}; {kind}")
@@ -87,11 +87,11 @@ def bound_lines(solution: Solution) -> list[str]:
     return lines
 
 
-def _side(problem: Posed) -> str:
+def _bound_side(problem: Posed) -> str:
     return "above" if problem.sense == "maximize" else "below"
 
 
-def _append(text: str, advice: str) -> str:
+def _append_advice(text: str, advice: str) -> str:
     return f"{text}; {advice}" if advice else text
 
 

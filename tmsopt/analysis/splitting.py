@@ -64,18 +64,18 @@ class Response:
 def compute_response(point: RootPoint, name: str) -> Response:
     """Response of a multiple root to a parameter, at the precision of `high_precision`."""
     k, relative = point.multiplicity, point.relative(name)
-    terms = _terms(point, name)
+    terms = _expand_terms(point, name)
     if terms is None:
         return Response(name, relative, (), 0, k)
     branches, unmoved = find_branches(terms)
-    laws = [law for branch in branches if (law := _confirm(point, name, branch))]
+    laws = [law for branch in branches if (law := _confirm_law(point, name, branch))]
     if unmoved and not _has_fixed_roots(point, name, branches, unmoved):
         unmoved = 0
     unresolved = k - unmoved - sum(law.branches.roots for law in laws)
     return Response(name, relative, tuple(laws), unmoved, unresolved)
 
 
-def _terms(point: RootPoint, name: str) -> list[list[complex]] | None:
+def _expand_terms(point: RootPoint, name: str) -> list[list[complex]] | None:
     """terms[m][j] of ε^m t^j, with t in the unit of the root; None if they are undefined.
 
     A term is 0 if it may be 0 within rounding errors.
@@ -95,28 +95,28 @@ def _terms(point: RootPoint, name: str) -> list[list[complex]] | None:
     ]
 
 
-def _confirm(point: RootPoint, name: str, branch: Branches) -> Law | None:
+def _confirm_law(point: RootPoint, name: str, branch: Branches) -> Law | None:
     """The law with its range of validity; None unless roots obey it for both signs of ε and over two decades."""
-    ends = [_validity_range(point, name, branch, sign) for sign in (-1, 1)]
+    ends = [_find_validity_range(point, name, branch, sign) for sign in (-1, 1)]
     if any(high < 10**_MIN_DECADES * max(low, 10.0 ** _DECADES[0]) for low, high in ends):
         return None
     of_s = replace(branch, constants=tuple(c * point.unit**branch.denominator for c in branch.constants))
     return Law(of_s, ends[0][1], ends[1][1], max(low for low, _ in ends))
 
 
-def _validity_range(point: RootPoint, name: str, branch: Branches, sign: int) -> tuple[float, float]:
+def _find_validity_range(point: RootPoint, name: str, branch: Branches, sign: int) -> tuple[float, float]:
     """The smallest and the largest sampled |ε| between which the roots obey the law; (0, 0) if they never do."""
 
     def holds(eps: float) -> bool:
         predicted = branch.shifts(sign * eps)
         scale = max(map(abs, predicted))
-        shifted = _local_coefficients(point, name, sign * eps, scale)
+        shifted = _expand_locally(point, name, sign * eps, scale)
         # In the variable 1/t the smallest t are the largest roots, which companion eigenvalues give to all digits.
         row = np.array([midpoint(c / shifted[point.multiplicity].abs_upper()) for c in shifted])
         row[np.cumsum(np.abs(row)) <= _NEGLIGIBLE_SHARE * np.abs(row).sum()] = 0  # roots that move far more slowly
-        return _deviation(predicted, scale, row) <= DEVIATION
+        return _measure_deviation(predicted, scale, row) <= DEVIATION
 
-    visible = _MIN_SHIFT * _root_scatter(point)
+    visible = _MIN_SHIFT * _measure_scatter(point)
     decades = [m for m in _DECADES if max(map(abs, branch.shifts(sign * 10.0**m))) > visible]
     low = next((m for m in decades if holds(10.0**m)), None)
     if low is None:
@@ -134,13 +134,13 @@ def _has_fixed_roots(point: RootPoint, name: str, branches: Sequence[Branches], 
 
     def count_roots(eps: float, radius: float) -> int | None:
         """Number of roots within a radius; None if no term is larger than the sum of all others."""
-        terms = [abs(x) for x in _local_coefficients(point, name, eps, radius)]
+        terms = [abs(x) for x in _expand_locally(point, name, eps, radius)]
         return next((u for u, x in enumerate(terms) if 2 * x > sum(terms, flint.arb(0))), None)
 
     def radii(eps: float) -> list[float]:
         """Radii, in the unit of the root, that should contain only the fixed roots."""
         if not branches:
-            return [max(small, _SCATTER_RADIUS * _root_scatter(point)) for small in _SMALL_RADII]
+            return [max(small, _SCATTER_RADIUS * _measure_scatter(point)) for small in _SMALL_RADII]
         least_shift = min(abs(t) for branch in branches for t in branch.shifts(eps))
         return [small * least_shift for small in (*_SMALL_RADII, *_WIDE_RADII)]
 
@@ -148,21 +148,21 @@ def _has_fixed_roots(point: RootPoint, name: str, branches: Sequence[Branches], 
     return all(any(count_roots(sign * eps, radius) == unmoved for radius in radii(eps)) for eps, sign in changes)
 
 
-def _local_coefficients(point: RootPoint, name: str, eps: float, scale: float) -> list[Any]:
+def _expand_locally(point: RootPoint, name: str, eps: float, scale: float) -> list[Any]:
     """Coefficients in t of the perturbed polynomial, corrected for the residual of the unperturbed multiple root."""
     perturbed = point.taylor(point.perturb(name, eps * point.step(name)), scale)
     unperturbed = point.expand(scale)
     return [a - b if j < point.multiplicity else a for j, (a, b) in enumerate(zip(perturbed, unperturbed, strict=True))]
 
 
-def _root_scatter(point: RootPoint) -> float:
+def _measure_scatter(point: RootPoint) -> float:
     """Distance between the roots that nearly meet, in the unit of the root."""
     k = point.multiplicity
     terms = [midpoint(x) for x in point.expand()[: k + 1]]
     return float(max(abs(x / terms[k]) ** (1 / (k - j)) for j, x in enumerate(terms[:k])))
 
 
-def _deviation(predicted: Sequence[complex], scale: float, row: NDArray[np.complex128]) -> float:
+def _measure_deviation(predicted: Sequence[complex], scale: float, row: NDArray[np.complex128]) -> float:
     """The largest relative distance of a predicted shift from the nearest true shift; inf if these are too few.
 
     Args:

@@ -38,7 +38,7 @@ def natural_step(unit: Unit, stored_unit: str, size: float) -> LimitStep:
         stored_unit: the unit in which the number is stored.
         size: a typical size of the number, such as the limit or the width of its range.
     """
-    return next(_steps(unit, stored_unit, size))
+    return next(_list_steps(unit, stored_unit, size))
 
 
 def step_within(
@@ -46,23 +46,23 @@ def step_within(
 ) -> LimitStep | None:
     """The largest natural step that keeps the moved limit physical; None at a physical end."""
     return next(
-        (step for step in _steps(unit, stored_unit, size) if limit + direction * step.size in physical_range), None
+        (step for step in _list_steps(unit, stored_unit, size) if limit + direction * step.size in physical_range), None
     )
 
 
-def _steps(unit: Unit, stored_unit: str, size: float) -> Iterator[LimitStep]:
+def _list_steps(unit: Unit, stored_unit: str, size: float) -> Iterator[LimitStep]:
     """The natural step, and then smaller and smaller steps."""
     size = abs(size) if abs(size) > _ZERO_SIZE else 1.0
-    largest = _one_two_five(_NATURAL_STEPS.get(stored_unit, _STEP_SHARE * size) / unit.one)
+    largest = _round_to_1_2_5(_NATURAL_STEPS.get(stored_unit, _STEP_SHARE * size) / unit.one)
     while stored_unit in _NATURAL_STEPS and largest * unit.one > _MAX_SHARES[stored_unit] * size:
         largest /= 10
     step = largest
     while step >= _MIN_SHARE * largest:
         yield LimitStep(step * unit.one, unit.show(step * unit.one, 4))
-        step = _one_two_five(step / 2.2)
+        step = _round_to_1_2_5(step / 2.2)
 
 
-def _one_two_five(x: float) -> float:
+def _round_to_1_2_5(x: float) -> float:
     """The number 1, 2 or 5 times a power of ten whose ratio to x is nearest to 1."""
     decade = math.floor(math.log10(x))
     choices = [k * 10.0**d for d in (decade, decade + 1) for k in (1, 2, 5)]

@@ -38,12 +38,12 @@ def list_warnings(solution: Solution) -> tuple[str, ...]:
     if solution.status == "infeasible":
         return ()
     problem = solution.problem.posed
-    idle = {name: _idle_warning(solution, name) for name in problem.free}
+    idle = {name: _warn_of_idle_parameter(solution, name) for name in problem.free}
     return (
-        *_abscissa_warning(problem),
-        *_active_bound_warning(solution),
+        *_warn_of_abscissa_unit(problem),
+        *_warn_of_active_bounds(solution),
         *filter(None, idle.values()),
-        *(text for name in problem.free if not idle[name] for text in _touched_bound_warnings(solution, name)),
+        *(text for name in problem.free if not idle[name] for text in _warn_of_reached_bounds(solution, name)),
     )
 
 
@@ -80,7 +80,7 @@ def _describe_quality(solution: Solution) -> str:
     return f"the {end} {goal} found is {unit_of(problem, goal).show(solution.value, 6)}, {sureness}"
 
 
-def _abscissa_warning(problem: Posed) -> Iterator[str]:
+def _warn_of_abscissa_unit(problem: Posed) -> Iterator[str]:
     """Warns that the unit of the abscissa depends on a free parameter."""
     free = [name for name in ("w", "g") if name in problem.free]
     if free and problem.parameter_set.root_unit == "√(g/w)" and "abscissa" in (problem.minimize or ""):
@@ -88,7 +88,7 @@ def _abscissa_warning(problem: Posed) -> Iterator[str]:
         yield f"the abscissa has the unit √(g/w), which varies with {' and '.join(free)}: {advice}"
 
 
-def _active_bound_warning(solution: Solution) -> Iterator[str]:
+def _warn_of_active_bounds(solution: Solution) -> Iterator[str]:
     """Active bounds that are not physical."""
     problem = solution.problem.posed
     bounds = (f"{name}.{end}" for name in problem.free for end in ("min", "max"))
@@ -103,7 +103,7 @@ def _describe_bound(problem: Posed, bound: str) -> str:
     return unit_of(problem, bound).show(split_bound(problem, bound)[2], 10)
 
 
-def _touched_bound_warnings(solution: Solution, name: str) -> Iterator[str]:
+def _warn_of_reached_bounds(solution: Solution, name: str) -> Iterator[str]:
     problem, x = solution.problem.posed, solution.parameters[name]
     for end, limit in zip(("min", "max"), problem.free[name], strict=True):
         bound = f"{name}.{end}"
@@ -112,14 +112,14 @@ def _touched_bound_warnings(solution: Solution, name: str) -> Iterator[str]:
             yield f"{name} is at {bound} = {_describe_bound(problem, bound)}; {reason}"
 
 
-def _idle_warning(solution: Solution, name: str) -> str:
+def _warn_of_idle_parameter(solution: Solution, name: str) -> str:
     """A warning if a parameter has no effect on goal and limits; empty if it has an effect."""
     problem = solution.problem.posed
     lower, upper = problem.free[name]
     points = [solution.parameters[name], *(lower + share * (upper - lower) for share in _RANGE_SHARES)]
     conditions = problem.conditions
     expressions: dict[Any, Expression] = {**conditions, **({None: problem.objective} if problem.objective else {})}
-    rows = [_signature(problem, {**solution.parameters, name: x}, expressions.values()) for x in points]
+    rows = [_evaluate_signature(problem, {**solution.parameters, name: x}, expressions.values()) for x in points]
     roots_move = _is_varying([monic for monic, _ in rows])
     affected = [
         n
@@ -136,7 +136,7 @@ def _idle_warning(solution: Solution, name: str) -> str:
     return f"{name} has no effect on {goals} here: any value from {ends}{condition} works"
 
 
-def _signature(
+def _evaluate_signature(
     problem: Posed, parameters: dict[str, float], expressions: Iterable[Expression]
 ) -> tuple[list[float], list[float]]:
     """Monic coefficients, and the values of expressions with fixed root quantities."""

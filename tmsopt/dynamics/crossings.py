@@ -87,15 +87,15 @@ def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, b
         bands_alone: compute only the bands, because the crossings take most of the time.
     """
     lower, upper = rational(lower), None if upper == math.inf else rational(upper)
-    p = _bivariate([flint.fmpq_poly([*map(rational, c)]) for c in reversed(coefficients)])
-    a, split = _rows(p), _split_factors(p)
+    p = _join_rows([flint.fmpq_poly([*map(rational, c)]) for c in reversed(coefficients)])
+    a, split = _split_rows(p), _split_factors(p)
     places = {
         kind: _isolate_real_roots(q, lower, upper)
-        for kind, q in _event_polynomials(a, split).items()
+        for kind, q in _list_event_polynomials(a, split).items()
         if not q.is_zero()
     }
     marks = sorted({y for ys in places.values() for y in ys})
-    cells = list(_cells(marks, lower, upper))
+    cells = list(_list_cells(marks, lower, upper))
     stable, damped = zip(*(_classify(_evaluate_at(a, middle)) for _, _, middle in cells), strict=True)
     lasting = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
     marginal = [any(lasting.values()) and _is_marginal(split, middle) for _, _, middle in cells]
@@ -112,10 +112,10 @@ def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, b
     )
     return Crossings(
         tuple(Crossing(float(y), *each, changed[float(y)]) for y, each in events),
-        _bands(cells, stable),
-        _bands(cells, damped),
+        _merge_bands(cells, stable),
+        _merge_bands(cells, damped),
         tuple(kind for kind, holds in always.items() if holds),
-        _bands(cells, marginal),
+        _merge_bands(cells, marginal),
         split.zeros,
     )
 
@@ -160,30 +160,35 @@ def _split_factors(p: Any) -> _Split:
     once = math.prod((f for f, _ in factors), start=_S**0)
     mirrored = once.gcd(once.compose(-_S, _Y))
     repeats_mirrored = p.gcd(p.compose(-_S, _Y)).degrees()[0] > mirrored.degrees()[0]
-    other_factors, squarefree = _rows(once / mirrored), _rows(once * _S if zeros else once)
+    other_factors, squarefree = _split_rows(once / mirrored), _split_rows(once * _S if zeros else once)
     return _Split(
-        zeros, _rows(mirrored), other_factors, squarefree, any(times > 1 for _, times in factors), repeats_mirrored
+        zeros,
+        _split_rows(mirrored),
+        other_factors,
+        squarefree,
+        any(times > 1 for _, times in factors),
+        repeats_mirrored,
     )
 
 
-def _event_polynomials(a: Sequence[Any], split: _Split) -> dict[str, Any]:
+def _list_event_polynomials(a: Sequence[Any], split: _Split) -> dict[str, Any]:
     """Polynomials in y whose roots are the crossings of each kind."""
-    even, odd = (_bivariate(split.other_factors[::-1][k::2]) for k in (0, 1))
-    once = _bivariate(split.squarefree[::-1])
+    even, odd = (_join_rows(split.other_factors[::-1][k::2]) for k in (0, 1))
+    once = _join_rows(split.squarefree[::-1])
     return {
         "capsize": split.mirrored[-1] * split.other_factors[-1],
         "infinity": a[0],
-        "weave": _rows(even.resultant(odd, "s"))[0] if len(split.other_factors) > 1 else flint.fmpq_poly(),
-        "EP2": _rows(once.discriminant("s"))[0] if len(split.squarefree) > 1 else flint.fmpq_poly(),
+        "weave": _split_rows(even.resultant(odd, "s"))[0] if len(split.other_factors) > 1 else flint.fmpq_poly(),
+        "EP2": _split_rows(once.discriminant("s"))[0] if len(split.squarefree) > 1 else flint.fmpq_poly(),
     }
 
 
-def _bivariate(rows: Sequence[Any]) -> Any:
+def _join_rows(rows: Sequence[Any]) -> Any:
     """A polynomial in s and y from its coefficients, ascending in s."""
     return _RING.from_dict({(i, j): x for i, row in enumerate(rows) for j, x in enumerate(row.coeffs())})
 
 
-def _rows(p: Any) -> list[Any]:
+def _split_rows(p: Any) -> list[Any]:
     """Coefficients of a polynomial in s and y, descending in s, as polynomials in y."""
     rows = [flint.fmpq_poly() for _ in range(p.degrees()[0] + 1)]
     for (i, j), value in p.to_dict().items():
@@ -215,14 +220,14 @@ def _find_events(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator
     if kind == "infinity":
         yield kind, Root(math.nan, 0.0), False
         return
-    coefficients = _finite_part(_evaluate_at(a, y))
-    size = _root_bound(a, y, coefficients)
+    coefficients = _strip_leading_zeros(_evaluate_at(a, y))
+    size = _bound_roots(a, y, coefficients)
     roots = _cluster_roots(coefficients, size)
     line = max((r.re for r in roots), default=math.nan)
 
     def count_roots(part: Sequence[Any], root: Root) -> int:
         """Multiplicity of a root in a factor."""
-        part_roots = _cluster_roots(_finite_part(_evaluate_at(part, y)), size)
+        part_roots = _cluster_roots(_strip_leading_zeros(_evaluate_at(part, y)), size)
         return sum(
             o.multiplicity for o in part_roots if abs(complex(o.re - root.re, o.im - root.im)) <= _SAME_ROOT * size
         )
@@ -237,14 +242,14 @@ def _find_events(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator
         yield name, root, root.re >= line - _SAME_ROOT * size
 
 
-def _finite_part(coefficients: Sequence[Any]) -> Sequence[Any]:
+def _strip_leading_zeros(coefficients: Sequence[Any]) -> Sequence[Any]:
     """The coefficients without leading zeros (within the digits of y), whose roots are at infinity."""
     largest = max(abs(c) for c in coefficients)
     first = next((k for k, c in enumerate(coefficients) if abs(c) > _ZERO_COEFFICIENT * largest), len(coefficients) - 1)
     return coefficients[first:]
 
 
-def _root_bound(a: Sequence[Any], y: Any, coefficients: Sequence[Any]) -> float:
+def _bound_roots(a: Sequence[Any], y: Any, coefficients: Sequence[Any]) -> float:
     """A bound on the size of the roots. Terms in y do not cancel, so it is positive even if all roots are 0."""
     terms = [flint.fmpq_poly([*map(abs, c.coeffs())])(abs(y)) for c in a[len(a) - len(coefficients) :]]
     lead = abs(coefficients[0])
@@ -273,7 +278,7 @@ def _classify(coefficients: Sequence[Any]) -> tuple[bool, bool]:
     return True, all(r.im == 0 for r in exact_roots(coefficients))
 
 
-def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tuple[float, float, Any]]:
+def _list_cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tuple[float, float, Any]]:
     """The intervals between marks: both ends, and a number between them."""
     for low, high in pairwise([lower, *marks, upper]):
         if high is None:
@@ -282,7 +287,7 @@ def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tupl
             yield float(low), float(high), (low + high) / 2
 
 
-def _bands(cells: Sequence[tuple[float, float, Any]], is_inside: Sequence[bool]) -> tuple[Stretch, ...]:
+def _merge_bands(cells: Sequence[tuple[float, float, Any]], is_inside: Sequence[bool]) -> tuple[Stretch, ...]:
     """The intervals that are inside. Adjacent ones are merged, even if the single point between them is not inside."""
     bands: list[Stretch] = []
     for (low, high, _), holds in zip(cells, is_inside, strict=True):

@@ -130,7 +130,7 @@ def growth(
     design_value = parameters[name]
     critical = float(Values(model, parameter_set, parameters)[f"{name}_c"]) if has_critical else math.nan
     speed = name in SPEEDS
-    low, high = _default_range(design, name, end, design_value)
+    low, high = _choose_range(design, name, end, design_value)
 
     def coefficients(x: Array) -> Array:
         """Of shape (n, degree + 1)."""
@@ -148,7 +148,7 @@ def growth(
         )
     crossings = user_crossings(model, crossings)
     if is_open:
-        high = _last_event(crossings.found, design_value)
+        high = _choose_end(crossings.found, design_value)
     events = tuple(c for c in crossings.found if low < c.at < high)
     centres = [design_value, *(c.at for c in events if "EP" in c.kind)]
     first = low + (high - low) / _GRID_POINTS if speed else low  # at rest a speed leaves roots 0
@@ -221,7 +221,7 @@ def _find_parameter(design: Solution, over: str | None) -> tuple[ParameterSet, d
     raise input_error(f"found '{over}'; {suggest(over, accepted)}", "over")
 
 
-def _default_range(design: Solution, name: str, end: float | None, design_value: float) -> Stretch:
+def _choose_range(design: Solution, name: str, end: float | None, design_value: float) -> Stretch:
     if end is not None:
         return min(end, 0.0), max(end, 0.0)
     if name in SPEEDS:
@@ -230,7 +230,7 @@ def _default_range(design: Solution, name: str, end: float | None, design_value:
     return (low, high) if low < high else (low - 1.0, high + 1.0)
 
 
-def _last_event(crossings: Sequence[Crossing], design_value: float) -> float:
+def _choose_end(crossings: Sequence[Crossing], design_value: float) -> float:
     """The end of a range of speeds that shows all events."""
     last_crossing = max((c.at for c in crossings if c.kind in ("weave", "capsize", "infinity")), default=0.0)
     shown_end = _FAR_RATIO * max(design_value, last_crossing, 0.5)

@@ -16,11 +16,8 @@ from tmsopt.records import Array, plain
 SETTLED = 0.02
 """Share of the peak within which a motion counts as settled."""
 
-FINEST, _MIN_POINTS, MOST = (
-    24,
-    1024,
-    2**19,
-)  # points in a period of the fastest oscillation; fewest and most points of the grid
+FINEST = 24  # points in a period of the fastest oscillation
+_MIN_POINTS, MOST = 1024, 2**19  # fewest and most points of the grid
 _EARLY_POINTS = 256  # additional points in the first step, in which fast roots decay
 _NEAR_PEAK = 0.95  # share of the largest sample that a sample near the true peak exceeds
 
@@ -110,8 +107,8 @@ class _Output:
     def find_turn(self, k: int) -> tuple[float, float]:
         """Time and value of the extremum of c x after point k of the grid."""
         A, state, time = self.motion.A, self.motion.states[k], self.motion.times[k]
-        delay = _find_zero(partial(_output_after, A, state, A.T @ self.row), self.motion.times[k + 1] - time)
-        return float(time + delay), _output_after(A, state, self.row, delay)
+        delay = _find_zero(partial(_evaluate_output, A, state, A.T @ self.row), self.motion.times[k + 1] - time)
+        return float(time + delay), _evaluate_output(A, state, self.row, delay)
 
     def settling_time(self, limit: float) -> float:
         """Time at which |c x| is above the limit for the last time; nan if it is above the limit at the end."""
@@ -129,11 +126,11 @@ class _Output:
                 begin, state, end = at, expm(motion.A * (at - motion.times[k])) @ motion.states[k], motion.times[k + 1]
         sign = math.copysign(1.0, float(self.row @ state))
         return float(
-            begin + _find_zero(lambda s: sign * _output_after(motion.A, state, self.row, s) - limit, end - begin)
+            begin + _find_zero(lambda s: sign * _evaluate_output(motion.A, state, self.row, s) - limit, end - begin)
         )
 
 
-def _output_after(A: Array, x: Array, row: Array, time: float) -> float:
+def _evaluate_output(A: Array, x: Array, row: Array, time: float) -> float:
     return float(row @ (expm(A * time) @ x))
 
 

@@ -82,32 +82,32 @@ def compute_mode_shapes(
         chain = min(chains, key=lambda d: abs(complex(d.re, d.im) - s), default=None)
         if root.multiplicity > 1 and chain is not None:
             s, geometric, partial = complex(chain.re, chain.im), chain.geometric, chain.partial
-        vectors = _null_vectors(pencil, s, geometric)
+        vectors = _compute_null_vectors(pencil, s, geometric)
         omega = next((complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag)])), None)
         for vector in vectors:
-            columns = _amplitudes(vector[: len(names)])
+            columns = _normalise_shape(vector[: len(names)])
             sizes, turns = (Table(dict(zip(names, column, strict=True))) for column in columns)
             at = rate * s.real, rate * s.imag
             shapes.append(ModeShape(*at, root.multiplicity, len(vectors), partial, sizes, turns, omega))
     return tuple(shapes)
 
 
-def _null_vectors(pencil: Sequence[Any], s: complex, count: int) -> Complex:
+def _compute_null_vectors(pencil: Sequence[Any], s: complex, count: int) -> Complex:
     """Null vectors of L(s) = Σ Pₖ s^(d−k) as rows. L is scaled first, so that the result does not depend on units."""
     powers = [s ** (len(pencil) - 1 - k) for k in range(len(pencil))]
     L = sum(z * P for z, P in zip(powers, pencil, strict=True))
     size = sum(abs(z) * np.abs(P) for z, P in zip(powers, pencil, strict=True))
-    rows = 1 / _or_one(size.max(axis=1, keepdims=True))
-    columns = 1 / _or_one((rows * size).max(axis=0))
+    rows = 1 / _replace_zeros(size.max(axis=1, keepdims=True))
+    columns = 1 / _replace_zeros((rows * size).max(axis=0))
     vectors: Complex = np.linalg.svd(rows * L * columns)[2][-count:].conj() * columns
     return vectors
 
 
-def _or_one(sizes: Any) -> Any:
+def _replace_zeros(sizes: Any) -> Any:
     return np.where(sizes > 0, sizes, 1.0)
 
 
-def _amplitudes(vector: Complex) -> tuple[list[float], list[float]]:
+def _normalise_shape(vector: Complex) -> tuple[list[float], list[float]]:
     """Amplitudes and phases; the first coordinate that moves has phase 0."""
     sizes = np.abs(vector) / np.abs(vector).max()
     is_moving = sizes > _ZERO_AMPLITUDE

@@ -9,13 +9,9 @@ from numpy.typing import NDArray
 
 from tmsopt.records import Array, Complex
 
-_MIN_POINTS, _MIN_SHARE = (
-    3,
-    1e-4,
-)  # of a piece, and of the range; rounding errors make shorter pieces, which are ignored
-_ISOLATED_RATIO = (
-    0.5  # two roots meet without a third if their distance is at most this share of the distance to the third
-)
+_MIN_POINTS, _MIN_SHARE = 3, 1e-4  # fewest points of a piece, and smallest share of the range; rounding makes others
+# two roots meet without a third if their distance is at most this share of the distance to the third
+_ISOLATED_RATIO = 0.5
 
 
 @dataclass(frozen=True)
@@ -96,12 +92,12 @@ def _split_pieces(values: Array, roots: Complex, multiple_meetings: Sequence[flo
         pairs = np.sort_complex(piece_roots[piece_roots.imag > 0].reshape(len(rows), -1))
         for k in range(1, len(rows)) if pairs.shape[1] > 1 else ():
             predicted = 2 * pairs[k - 1] - pairs[k - 2] if k > 1 else pairs[k - 1]
-            pairs[k] = pairs[k][_match(predicted, pairs[k])]
+            pairs[k] = pairs[k][_match_roots(predicted, pairs[k])]
         parts.append(_Piece(values[rows], np.concatenate([reals, pairs], axis=1), count))
     return parts
 
 
-def _match(a: Complex, b: Complex) -> NDArray[np.intp]:
+def _match_roots(a: Complex, b: Complex) -> NDArray[np.intp]:
     """Indices of b matched one to one to a, with the least sum of squared distances."""
     squares = np.abs(a[:, None] - b) ** 2
     if len(a) <= 2:  # always so for a bicycle
@@ -140,9 +136,10 @@ def _pass_names(old_piece: _Piece, names: list[str], new_piece: _Piece, forward:
     ]
     if abs(r[i + 1] - r[i]) > _ISOLATED_RATIO * distances[0] or 2 * p[j].imag > _ISOLATED_RATIO * distances[1]:
         return []
+    # the real roots stay in order; only pairs are matched
     other_roots[few_reals.real :] = other_roots[few_reals.real :][
-        _match(r[other_reals[few_reals.real :]], p[other_roots[few_reals.real :]])
-    ]  # real ones stay in order
+        _match_roots(r[other_reals[few_reals.real :]], p[other_roots[few_reals.real :]])
+    ]
     if many_reals is old_piece:
         pair_name = names[i] if names[i] == names[i + 1] else f"{names[i + 1]} + {names[i]}"
         new_names = {j: pair_name} | {b: names[a] for a, b in zip(other_reals, other_roots, strict=True)}

@@ -25,10 +25,8 @@ from tmsopt.records import Array, Column, Table, Tabular, plain
 from tmsopt.roots import Structure
 
 _DECAYS, _GROWTHS, _RADIANS = 10.0, 3.0, 200.0  # durations in units of 1/|abscissa| (twice) and 1/|s|
-_DOUBLINGS, _STILL_RATIO = (
-    8,
-    0.002,
-)  # doublings of the duration until the second half is this much smaller than the peak
+_DOUBLINGS = 8  # most doublings of the duration
+_STILL_RATIO = 0.002  # largest share of the peak in the second half of a long enough duration
 _NO_GROWTH, _ROUNDING = 1e-9, 1e-12  # growth and decay, relative to the largest root, that are not significant
 _MIN_DECAY = _DECAYS * FINEST / (2 * math.pi * MOST)  # decay, relative to the fastest root, too slow for the grid
 _DRIFT = 10.0  # duration in units of 1/‖A‖ if all roots are 0
@@ -188,7 +186,7 @@ def simulate(
         force = disturbance.noise * system.impulses["T_delta"]
         states = simulate_noise(system.A, x, force, step, points, seed)
         measures = tuple(_find_peak(name, times, states @ row) for name, row in watched.items())
-        deviations = _long_run_deviations(system, force) if stable else deviations
+        deviations = _compute_deviations(system, force) if stable else deviations
     else:
         states = sample_motion(system.A, x, step, points)
         measures = tuple(measure_output(name, row, motion, decays) for name, row in watched.items())
@@ -272,7 +270,7 @@ def _find_peak(name: str, times: Array, values: Array) -> Measure:
     return Measure(name, float(values[k]), float(times[k]), math.nan, math.nan)
 
 
-def _long_run_deviations(system: System, force: Array) -> Table[float]:
+def _compute_deviations(system: System, force: Array) -> Table[float]:
     """Stationary standard deviations of all columns except the path, whose deviation grows without limit."""
     n = len(system.names)
     spread = stationary_covariance(system.A[:n, :n], force[:n])

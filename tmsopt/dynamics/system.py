@@ -101,7 +101,7 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     if len(pencil) == 3:
         A = np.block([[np.zeros((n, n)), np.eye(n)], [A, -np.linalg.solve(pencil[0], pencil[1])]])
     if is_bicycle(model):
-        return _bicycle_system(A, pencil[0], problem, parameters)
+        return _build_bicycle_system(A, pencil[0], problem, parameters)
     q = coordinates_of(model, pencil)
     names = (*q, *(f"{name}dot" for name in q)) if len(pencil) == 3 else q
     if model.double is not None:
@@ -111,7 +111,7 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     return System(names, q, A, Table(dict(zip(names, np.eye(len(names)), strict=True))), Table(), math.nan, Table())
 
 
-def _bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, float]) -> System:
+def _build_bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, float]) -> System:
     """The system with the path as two more states and the torques of a controller as rows, in the user's units."""
     parameter_set = problem.parameter_set
     native = parameter_set.native(parameters)

@@ -57,7 +57,9 @@ def instant_bound(problem: Posed, value: float) -> Bound:
     product_bound = omega0_bound(problem, value)
     if product_bound.proven or not minimizes_abscissa(problem):
         return product_bound
-    linear_bound = _compare_with_bound(relation_bound(_first_case(problem)), value, "relation", objective_size(problem))
+    linear_bound = _compare_with_bound(
+        relation_bound(_select_first_case(problem)), value, "relation", objective_size(problem)
+    )
     return linear_bound if linear_bound.value > product_bound.value else product_bound
 
 
@@ -66,13 +68,13 @@ def omega0_bound(problem: Posed, value: float) -> Bound:
 
     With scenarios, it is the bound of the first scenario, because the worst case is never better than this.
     """
-    largest = _largest_product(_first_case(problem)) if minimizes_abscissa(problem) else math.inf
+    largest = _bound_product(_select_first_case(problem)) if minimizes_abscissa(problem) else math.inf
     return _compare_with_bound(
         -(largest ** (1 / problem.model.degree)) * (1 + ROUNDING), value, "omega0", objective_size(problem)
     )
 
 
-def _first_case(problem: Posed) -> Posed:
+def _select_first_case(problem: Posed) -> Posed:
     """The problem at its first scenario."""
     if not problem.scenarios:
         return problem
@@ -92,7 +94,7 @@ def is_gap_closed(gap: float, bound: float, size: float = 1.0) -> bool:
     return gap <= PROVEN * (size + abs(bound))
 
 
-def _largest_product(problem: Posed) -> float:
+def _bound_product(problem: Posed) -> float:
     """Greatest |aₙ/a0| over the box; inf if a0 may vanish or the maximum cannot be enclosed.
 
     If aₙ and a0 are linear in a parameter, their quotient is monotone in it, so its extremes are at the ends. At most
@@ -100,50 +102,50 @@ def _largest_product(problem: Posed) -> float:
     """
     model = problem.model
     if len(problem.free) > _MAX_FREE or not is_rational(model, model.sets[0]):
-        return _enclosed_product(problem)
-    box, exact_ends = _algebraic_box(problem)
-    outer = _outer_coefficients(model, tuple(box))
+        return _enclose_product(problem)
+    box, exact_ends = _build_algebraic_box(problem)
+    outer = _trace_outer_coefficients(model, tuple(box))
     shares = np.random.default_rng(0).random(len(box)).tolist()  # a generic point, where no power vanishes
     inner_point = [lo + (hi - lo) * share for (lo, hi), share in zip(box.values(), shares, strict=True)]
     try:
         through = {n: _restrict_to_line(outer, inner_point, n) for n, (lo, hi) in box.items() if lo < hi}
     except (DomainError, TypeError):  # division by a parameter, or by 0 for the fixed ones
-        return _enclosed_product(problem)
+        return _enclose_product(problem)
     varying = {n: max(a.degree() for a in ends) for n, (*ends, turning) in through.items() if turning}
     curved = [n for n, degree in varying.items() if degree > 1]
     if len(curved) > 1:
-        return _enclosed_product(problem)
+        return _enclose_product(problem)
     at = [ends if varying.get(n) == 1 else (sum(ends) / 2,) for n, ends in box.items()]
     points = [*itertools.product(*at)]
     for name in curved:
-        extremes = [_extremes_along(outer, corner, name, *box[name]) for corner in points]
+        extremes = [_find_extremes(outer, corner, name, *box[name]) for corner in points]
         if not all(extremes):
             return math.inf
         points = [*itertools.chain(*extremes)]
-    return _largest_ratio(outer, dict(zip(box, np.array(points).T, strict=True)), exact_ends)
+    return _find_largest_ratio(outer, dict(zip(box, np.array(points).T, strict=True)), exact_ends)
 
 
 @lru_cache(maxsize=64)
-def _outer_coefficients(model: Model, names: tuple[str, ...]) -> Formula:
+def _trace_outer_coefficients(model: Model, names: tuple[str, ...]) -> Formula:
     """a0 and aₙ in the algebraic parameters."""
     return trace(lambda x: model.polynomial(**x)[:: model.degree], names)
 
 
-def _enclosed_product(problem: Posed) -> float:
+def _enclose_product(problem: Posed) -> float:
     """Upper bound of |aₙ/a0| over the box in interval arithmetic; inf if the interval of a0 contains 0."""
     with flint.ctx.workprec(_BITS):
         box = {n: ball(ends) for n, ends in problem.free.items()}
         parameters = problem.ordered({n: exact(v) for n, v in problem.fixed.items()} | box)
-        return _ratio_upper_end(problem.model.coefficients(parameters, problem.parameter_set))
+        return _bound_ratio(problem.model.coefficients(parameters, problem.parameter_set))
 
 
-def _ratio_upper_end(a: Sequence[Any]) -> float:
+def _bound_ratio(a: Sequence[Any]) -> float:
     """Upper end of the interval of |aₙ/a0|; inf if the quotient may not exist."""
     upper = as_ball(abs(quotient(as_ball(a[-1]), as_ball(a[0])))).upper()
     return float(upper) if upper.is_finite() else math.inf
 
 
-def _largest_ratio(outer: Formula, points: Mapping[str, Array], exact_ends: ExactEnds) -> float:
+def _find_largest_ratio(outer: Formula, points: Mapping[str, Array], exact_ends: ExactEnds) -> float:
     """Greatest |aₙ/a0| over the points; inf unless a0 has one sign at all of them.
 
     Where both coefficients are 0, the quotient is constant along the adjacent edges. The largest quotients are computed
@@ -158,7 +160,7 @@ def _largest_ratio(outer: Formula, points: Mapping[str, Array], exact_ends: Exac
     with flint.ctx.workprec(_BITS):
         for k in np.flatnonzero(quotients >= quotients.max() / 2):
             at = {n: float(column[k]) for n, column in points.items()}
-            quotients[k] = _ratio_upper_end(values(outer, {n: exact_ends.get((n, x), exact(x)) for n, x in at.items()}))
+            quotients[k] = _bound_ratio(values(outer, {n: exact_ends.get((n, x), exact(x)) for n, x in at.items()}))
     return float(quotients.max())
 
 
@@ -169,7 +171,7 @@ def _restrict_to_line(outer: Formula, point: Sequence[float], name: str) -> tupl
     return first, last, last.derivative() * first - last * first.derivative()
 
 
-def _extremes_along(outer: Formula, corner: Sequence[float], name: str, *ends: float) -> list[tuple[float, ...]]:
+def _find_extremes(outer: Formula, corner: Sequence[float], name: str, *ends: float) -> list[tuple[float, ...]]:
     """The ends and stationary points along the nonlinear parameter from a corner; empty if the line has a pole."""
     first, _, turning = _restrict_to_line(outer, corner, name)
     poles, turning_points = (
@@ -182,7 +184,7 @@ def _extremes_along(outer: Formula, corner: Sequence[float], name: str, *ends: f
     return [tuple(x if n == name else c for n, c in zip(outer.names, corner, strict=True)) for x in places]
 
 
-def _algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]], ExactEnds]:
+def _build_algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]], ExactEnds]:
     """Range of each algebraic parameter in doubles, and the exact intervals of its ends.
 
     Algebraic parameters are monotone in each parameter of a set, so the corners of the box are enough. √(1 + T²) is
@@ -218,13 +220,13 @@ def relation_bound(problem: Posed) -> float:
     the free parameters (for angles, of their tangents). Relations are found in exact arithmetic at random designs, and
     they must also hold at further random designs.
     """
-    rows = _exact_rows(problem) if is_rational(problem.model, problem.parameter_set) else None
+    rows = _sample_exact_rows(problem) if is_rational(problem.model, problem.parameter_set) else None
     if not rows:
         return -math.inf
     # Independent b with Σ b_k a_k = 0, reduced from the leading coefficient on and from the last one.
-    reduced = [*_null_space(rows), *(b[::-1] for b in _null_space([row[::-1] for row in rows]))]
+    reduced = [*_compute_null_space(rows), *(b[::-1] for b in _compute_null_space([row[::-1] for row in rows]))]
     with flint.ctx.workprec(_BITS):
-        return max(map(_bound_from_relation, reduced), default=-math.inf)
+        return max(map(_bound_by_relation, reduced), default=-math.inf)
 
 
 @lru_cache(maxsize=64)
@@ -243,7 +245,7 @@ def is_rational(model: Model, parameter_set: ParameterSet) -> bool:
     return len(powers) + len(rational) == len(coefficients.steps)
 
 
-def _null_space(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
+def _compute_null_space(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
     """Reduced basis of the null space of the rows."""
     reduced, rank = flint.fmpq_mat([list(row) for row in rows]).rref()
     width = range(len(rows[0]))
@@ -255,7 +257,7 @@ def _null_space(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
     ]
 
 
-def _bound_from_relation(relation: Sequence[Any]) -> float:
+def _bound_by_relation(relation: Sequence[Any]) -> float:
     """−z, where z is the largest real zero of h and its derivatives; −inf for the relation a0 = 0."""
     n = len(relation) - 1
     h: Any = flint.fmpq_poly([b * math.comb(n, k) for k, b in enumerate(relation)])
@@ -267,7 +269,7 @@ def _bound_from_relation(relation: Sequence[Any]) -> float:
     return math.nextafter(-largest, -math.inf) if largest else 0.0
 
 
-def _exact_rows(problem: Posed) -> list[list[Any]] | None:
+def _sample_exact_rows(problem: Posed) -> list[list[Any]] | None:
     """Coefficients at random designs of the box; None if a coefficient is not a fraction."""
     parameter_set, rng, rows = problem.parameter_set, np.random.default_rng(0), []
     if any(parameter_set[n].tangent and v != 0 for n, v in problem.fixed.items()):

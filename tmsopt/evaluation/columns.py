@@ -114,7 +114,9 @@ def _evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Seq
     bound, related = _find_bounds(problem, coefficients, round_or_doubt)
     bound = np.where(feasible, bound, -np.inf)
     certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT_RATIO * PROVEN * (1.0 + np.abs(bound))))
-    residuals = _law_residuals(problem, bounded, coefficients, feasible, round_or_doubt) if problem.model is tms else {}
+    residuals = (
+        _compute_law_residuals(problem, bounded, coefficients, feasible, round_or_doubt) if problem.model is tms else {}
+    )
     return Columns(
         certain,
         objective,
@@ -204,7 +206,7 @@ def _find_bounds(
     return np.maximum(linear_bound, product_bound), linear_bound > product_bound
 
 
-def _law_residuals(
+def _compute_law_residuals(
     problem: Posed,
     bounded: Mapping[str, Any],
     coefficients: Sequence[Bounded],

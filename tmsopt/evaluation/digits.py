@@ -68,7 +68,7 @@ def certified_numbers(
     for case in {checked.least_damped, checked.fastest} - {checked.worst}:
         structures[case] = problem.values(case.applied(parameters))["structure"]
     stated_cases = [case for case in cases if not case.direction]
-    design = _Design(problem, _exact_numbers(parameters), checked, stated_cases, structures)
+    design = _Design(problem, _convert_exactly(parameters), checked, stated_cases, structures)
     default_numbers: dict[_Key, float] = {("value", ""): checked.objective, ("realised", ""): checked.realised}
     default_numbers["abscissa", ""] = checked.structure.abscissa
     default_numbers |= {("quantities", name): x for name, x in checked.quantities.items()}
@@ -79,7 +79,7 @@ def certified_numbers(
             roots = design.roots(last=precision == _PRECISIONS[-1])
             balls = [] if roots is None else [each for each in design.balls(*roots) if each[0] not in numbers]
             for key, ball, digits in balls:
-                number = _nearest(ball, digits)
+                number = _round_ball(ball, digits)
                 # Rounded parameters may be just outside the domain of a quantity, for example near Fr_c = 0.
                 if number is not None and not (
                     math.isfinite(default_numbers.get(key, math.nan)) and math.isnan(number)
@@ -102,13 +102,13 @@ def certified_numbers(
     )
 
 
-def _nearest(ball: Any, digits: int) -> Any:
+def _round_ball(ball: Any, digits: int) -> Any:
     """The rounded value of a ball, a root or a tuple of these; None if the rounding is uncertain."""
     if isinstance(ball, tuple):
-        parts = tuple(_nearest(part, digits) for part in ball)
+        parts = tuple(_round_ball(part, digits) for part in ball)
         return None if None in parts else parts
     if isinstance(ball, EnclosedRoot):
-        place = _nearest((ball.re, ball.im), digits)
+        place = _round_ball((ball.re, ball.im), digits)
         return place and Root(place[0], place[1], ball.multiplicity)
     return nearest_decimal(ball, digits) if digits else nearest_double(ball)
 
@@ -138,13 +138,13 @@ class _Design:
         )
         worst, damped, fastest = (ideal[c] for c in (checked.worst, checked.least_damped, checked.fastest))
         if stored:
-            yield ("realised", ""), _rightmost(stored), 0
+            yield ("realised", ""), _find_rightmost(stored), 0
         if damped and model.carrier is None:
-            known_values["damping_ratio"] = reduce(lesser, map(_ratio, damped))
+            known_values["damping_ratio"] = reduce(lesser, map(_compute_damping_ratio, damped))
         if fastest and ANGULAR_FREQUENCY in checked.quantities:
             known_values[ANGULAR_FREQUENCY] = reduce(greater, (root.im for root in fastest))
         if worst:
-            known_values["abscissa"] = _rightmost(worst)
+            known_values["abscissa"] = _find_rightmost(worst)
             yield ("abscissa", ""), known_values["abscissa"], 0
             yield ("roots", ""), _to_user_roots(model, worst), 0
         if checked.robustness and math.isfinite(checked.robustness.radius):
@@ -189,19 +189,19 @@ class _Design:
 
     def values(self, case: Case) -> Values:
         """Everything derived from the exact parameters in a case, without root quantities."""
-        varied = Case(Table(_exact_numbers(case.at)), Table(_exact_numbers(case.offset))).applied(self.exact)
+        varied = Case(Table(_convert_exactly(case.at)), Table(_convert_exactly(case.offset))).applied(self.exact)
         return Values(self.problem.model, self.problem.parameter_set, varied)
 
 
-def _exact_numbers(table: Numbers) -> dict[str, Any]:
+def _convert_exactly(table: Numbers) -> dict[str, Any]:
     return {name: exact(value) for name, value in table.items()}
 
 
-def _rightmost(roots: _Several) -> Any:
+def _find_rightmost(roots: _Several) -> Any:
     return reduce(greater, (root.re for root in roots))
 
 
-def _ratio(root: EnclosedRoot) -> Any:
+def _compute_damping_ratio(root: EnclosedRoot) -> Any:
     """−Re s/|s|; 0 for a root at 0."""
     return flint.arb(0) if root.re == 0 and root.im == 0 else -root.re / root.modulus
 

@@ -91,8 +91,8 @@ class LawRow:
 def law_rows(design: Solution) -> Iterator[LawRow]:
     """Every law, with a reason if it does not apply to the design."""
     p = {name: float(value) for name, value in design.dimensionless.items()}
-    heights, tilted = _heights(p), _heights(p, "lambda_s")
-    not_ep4 = "" if design.structure == "EP4" else f"holds at EP4; {_why_not_ep4(design)}"
+    heights, tilted = _select_parameters(p), _select_parameters(p, "lambda_s")
+    not_ep4 = "" if design.structure == "EP4" else f"holds at EP4; {_explain_missing_ep4(design)}"
     not_one = "" if p["chi_H"] == 1 else f"needs chi_H = 1; here chi_H = {p['chi_H']:.6g}"
     r, T = design.abscissa, math.tan(p["lambda_s"])
     a = np.array([design.quantities[f"a{k}"] for k in range(5)])
@@ -110,9 +110,8 @@ def law_rows(design: Solution) -> Iterator[LawRow]:
 
     general = not_ep4 or ("" if not_one else "at chi_H = 1 the mass ratio is free; see the laws for chi_H = 1")
     branches = laws.ep4(r, **heights, chi_H=p["chi_H"])
-    branch = min(
-        branches, key=lambda b: abs(float(b.tan_lambda_s) - T) + abs(float(b.Fr) - p["Fr"])
-    )  # nearest to the design
+    # the branch of the law that is nearest to the design
+    branch = min(branches, key=lambda b: abs(float(b.tan_lambda_s) - T) + abs(float(b.Fr) - p["Fr"]))
     closed = (("Fr", p["Fr"], branch.Fr), ("mu", p["mu"], branch.mu), ("tan(lambda_s)", T, branch.tan_lambda_s))
     for subject, numeric, law in closed:
         yield row(_CLOSED_FORM, f"{subject}, closed form for any chi_H", numeric, law, general)
@@ -149,7 +148,7 @@ def speed_laws(p: Mapping[str, Any], critical: Any, coefficients: Any) -> dict[s
         coefficients: shape (…, 5).
     """
     heights, tilted, shape = (
-        _heights(p, *names) for names in ((), ("lambda_s",), ("lambda_s", "mu", "chi_B", "chi_H"))
+        _select_parameters(p, *names) for names in ((), ("lambda_s",), ("lambda_s", "mu", "chi_B", "chi_H"))
     )
     exists, has_unit_height = np.isfinite(critical), p["chi_H"] == 1
     best = laws.chibm(**heights)
@@ -164,12 +163,12 @@ def speed_laws(p: Mapping[str, Any], critical: Any, coefficients: Any) -> dict[s
     }
 
 
-def _heights(p: Mapping[str, Any], *names: str) -> dict[str, Any]:
+def _select_parameters(p: Mapping[str, Any], *names: str) -> dict[str, Any]:
     """The parameters zeta_B and zeta_H, and further parameters by name."""
     return {n: p[n] for n in ("zeta_B", "zeta_H", *names)}
 
 
-def _why_not_ep4(design: Solution) -> str:
+def _explain_missing_ep4(design: Solution) -> str:
     binding = ", ".join(design.active)
     reason = f" because {binding} bind{'s' if len(design.active) == 1 else ''}" if binding else ""
     if not design.problem.free:

@@ -163,7 +163,7 @@ def _is_out_of_reach(problem: Posed, condition: Expression, values: Values) -> b
         np.abs(at), np.where(np.arange(len(at)) < len(parameter_set.names), np.ptp(ends, axis=1), 1.0)
     )
     try:
-        function = _condition_with_slopes(problem.model, parameter_set.name, condition, names)
+        function = _trace_condition(problem.model, parameter_set.name, condition, names)
         centre, around = (ranges(function, list(zip(at - r, at + r, strict=True))) for r in (0 * reach, reach))
     except UnsupportedOperation:
         return False
@@ -174,7 +174,7 @@ def _is_out_of_reach(problem: Posed, condition: Expression, values: Values) -> b
 
 
 @lru_cache(maxsize=256)
-def _condition_with_slopes(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> Formula:
+def _trace_condition(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> Formula:
     """A condition and its gradient as a function of parameters and root quantities."""
     symbols, parameter_set = {name: symbol(name) for name in names}, model.parameter_set(set_name)
     difference = condition(
@@ -188,7 +188,7 @@ def measure_excesses(problem: Posed, parameters: Numbers, cases: Sequence[Case])
     evaluated, excesses = _evaluate_cases(problem, parameters, cases), {}
     for name, condition in problem.conditions.items():
         differences = [float(condition(v)) for v in evaluated.relevant_cases(condition)]
-        excess = max(0.0, *(_nan_as_infinite(condition.sign * d) for d in differences))
+        excess = max(0.0, *(_replace_nan(condition.sign * d) for d in differences))
         excesses[name] = differences[0] if condition.equality else excess
     return excesses
 
@@ -219,7 +219,7 @@ class _CaseValues:
         if objective is None:
             return math.nan
         return sign * max(
-            (sign * float(objective(values)) for values in self.relevant_cases(objective)), key=_nan_as_infinite
+            (sign * float(objective(values)) for values in self.relevant_cases(objective)), key=_replace_nan
         )
 
     def violations(self, conditions: Mapping[str, Expression]) -> tuple[dict[str, float], dict[str, float]]:
@@ -227,9 +227,7 @@ class _CaseValues:
         violations, amounts = {}, {}
         for name, condition in conditions.items():
             at = self.relevant_cases(condition)
-            violation, worst = max(
-                ((condition.violation(v), v) for v in at), key=lambda pair: _nan_as_infinite(pair[0])
-            )
+            violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _replace_nan(pair[0]))
             if not violation <= FEASIBLE or (violation > 0 and _is_out_of_reach(self.problem, condition, worst)):
                 violations[name] = violation
                 amounts[name] = float(condition.excess(float(condition(worst))))
@@ -256,7 +254,7 @@ def _evaluate_cases(
 
     nominal, *each = map(values, (Case(), *stated_cases))
     worst = {
-        name: max(range(len(each)), key=lambda k: _nan_as_infinite(sign * each[k][name]))
+        name: max(range(len(each)), key=lambda k: _replace_nan(sign * each[k][name]))
         for name, sign in WORSE_DIRECTION.items()
         if name != ANGULAR_FREQUENCY or problem.asks(ANGULAR_FREQUENCY)
     }
@@ -269,7 +267,7 @@ def _evaluate_cases(
     return _CaseValues(problem, stated_cases, nominal, each, worst, robustness)
 
 
-def _nan_as_infinite(value: float) -> float:
+def _replace_nan(value: float) -> float:
     return math.inf if math.isnan(value) else value
 
 

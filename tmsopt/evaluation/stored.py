@@ -45,10 +45,7 @@ _MIN_SIZE = 1e-3  # natural size of a parameter near 0, as a share of its range
 _MIN_STEP = 1e-20  # relative step of a parameter that is 0
 _BITS = 60  # fractional bits of the lattice coordinates
 _ZERO_SIZE = 1e-14  # share of the size of the roots below which an abscissa counts as 0
-_SHOWN_DIFFERENCE, _SHOWN_DIGITS = (
-    1e-6,
-    7,
-)  # relative difference from which both abscissae are shown; digits that show it
+_SHOWN_DIFFERENCE, _SHOWN_DIGITS = 1e-6, 7  # relative difference from which both abscissae are shown, and digits
 _ROUNDINGS = (1, -1, 4, -4, 16, -16, 64, -64, 256, -256)  # units in the last place to try
 _END_DISTANCE = 1e-9  # share of a range; a parameter that is closer to an end stays at the end
 
@@ -96,7 +93,7 @@ def find_storable_design(
     if checked.violations or (not amounts and _has_objective(problem, parameters)):
         return parameters, checked, {}
     if amounts:
-        clusters = _clusters(problem, parameters, checked, cases, list(amounts))
+        clusters = _find_clusters(problem, parameters, checked, cases, list(amounts))
         ends = problem.free.items()
         inner_names = [
             n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _END_DISTANCE * (hi - lo)
@@ -158,7 +155,7 @@ def missed_note(problem: Posed, amounts: Numbers) -> tuple[str, ...]:
     )
 
 
-def _clusters(
+def _find_clusters(
     problem: Posed,
     parameters: Numbers,
     checked: Evaluation,
@@ -234,7 +231,7 @@ class _SpreadRoots:
             return
         units = np.maximum([math.ulp(x) for x in start.values()], _MIN_STEP * self.widths)
         rows = np.hstack([slope * units[:, None] / leeway, np.diag(units / moves)])
-        for counts in _nearest_combinations(rows, np.array([*(deviations / leeway), *(rounding / moves)])):
+        for counts in _list_combinations(rows, np.array([*(deviations / leeway), *(rounding / moves)])):
             steps = zip(start.items(), counts, units.tolist(), strict=True)
             design = {**self.parameters, **{n: x + count * unit for (n, x), count, unit in steps}}
             if all(lo <= design[n] <= hi for n, (lo, hi) in self.problem.free.items()):
@@ -272,7 +269,7 @@ class _SpreadRoots:
         return [(x - t).mid() for x, t in zip(parts, target, strict=True)]
 
 
-def _nearest_combinations(rows: Array, residual: Array) -> Iterator[list[int]]:
+def _list_combinations(rows: Array, residual: Array) -> Iterator[list[int]]:
     """Integer combinations of rows that cancel `residual` best; the best combination comes first."""
     integers = [[int(math.ldexp(x, _BITS)) for x in row] for row in rows.tolist()]
     reduced, transform = flint.fmpz_mat(integers).lll(True)

@@ -67,14 +67,14 @@ def find_worst_cases(problem: Posed, parameters: Numbers) -> dict[str, Worst]:
     for name, (sign, target) in targets.items():
         shared = {n: worst_of[n].value for n in worst_of if isinstance(target, Expression) and n in target.names}
         measured = []
-        for case in _peaks(problem, parameters, sign, target, shared):
+        for case in _find_peaks(problem, parameters, sign, target, shared):
             values = problem.values(case.applied(parameters)).with_known(shared)
             measured.append(Worst(case, float(values[target] if isinstance(target, str) else target(values))))
         worst_of[name] = max(measured, key=lambda w: sign * w.value if np.isfinite(w.value) else np.inf)
     return worst_of
 
 
-def _peaks(
+def _find_peaks(
     problem: Posed, parameters: Numbers, sign: float, target: Expression | str, shared: Numbers
 ) -> Iterator[Case]:
     """The refined worst points of a grid, for every choice of separate scenario values."""
@@ -97,12 +97,12 @@ def _peaks(
         if size == 0:
             yield Case(Table(fixed))
             continue
-        u = _start_points(size)
+        u = _list_start_points(size)
         heights = badness(u)
         step = 1 / (_LINE_POINTS - 1) if size == 1 else 0.5 * len(u) ** (-1 / size)
-        rows = _separate_peaks(u, heights, 4 * step)
+        rows = _select_peaks(u, heights, 4 * step)
         best_points, value, indices = u[rows], heights[rows], np.arange(len(rows))
-        moves = _random_steps(len(rows), size)
+        moves = _draw_steps(len(rows), size)
         for look in range(_ROUNDS):  # all peaks at once, since calls cost more than points
             reach = step * (_SHRINK if size == 1 else _SHRINK ** (1 / 2)) ** look
             around = np.clip(best_points[:, None] + reach * moves[:, look], 0, 1)
@@ -115,7 +115,7 @@ def _peaks(
             yield Case(Table(case.at), Table(case.offset))
 
 
-def _start_points(size: int) -> Array:
+def _list_start_points(size: int) -> Array:
     """Points of the unit cube: evenly along a line, or corners, edges, midpoints and a quasi-random sequence."""
     if size == 1:
         return np.linspace(0, 1, _LINE_POINTS)[:, None]
@@ -132,7 +132,7 @@ def _start_points(size: int) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _random_steps(peaks: int, size: int) -> Array:
+def _draw_steps(peaks: int, size: int) -> Array:
     """Random steps around each peak in each round; every second step is along one axis, so that it stays on an edge."""
     rng = np.random.default_rng(0)
     steps = np.empty((peaks, _ROUNDS, _POINTS_AROUND, size))
@@ -143,7 +143,7 @@ def _random_steps(peaks: int, size: int) -> Array:
     return steps
 
 
-def _separate_peaks(u: Array, heights: Array, distance: float) -> list[int]:
+def _select_peaks(u: Array, heights: Array, distance: float) -> list[int]:
     """Indices of the highest points at least a distance apart."""
     peaks: list[int] = []
     for k in np.argsort(-heights, kind="stable"):
@@ -202,7 +202,7 @@ def _is_left_of(problem: Posed, parameters: Numbers, box: _Box, gamma: Any) -> b
         if series_name:
             at[series_name] = flint.arb_series([at[series_name], 1], prec=2)
         a = problem.model.coefficients(at, problem.parameter_set)
-        sign = -1 if _series_term(a[0], 0) < 0 else 1
+        sign = -1 if _get_series_term(a[0], 0) < 0 else 1
         shifted = [sign * c for c in shift(a, gamma)]
         return [shifted[0], *lienard_chipart(shifted)]
 
@@ -216,11 +216,11 @@ def _is_left_of(problem: Posed, parameters: Numbers, box: _Box, gamma: Any) -> b
     for side, ends in box.items():
         if ends[0] < ends[1]:
             move = ball(ends) - middle[side][0]
-            slopes = (_series_term(test, 1) for test in tests(box, side[1]))
+            slopes = (_get_series_term(test, 1) for test in tests(box, side[1]))
             at_middle = [test + slope * move for test, slope in zip(at_middle, slopes, strict=True)]
     return all(test > 0 for test in at_middle)
 
 
-def _series_term(test: Any, order: int) -> Any:
+def _get_series_term(test: Any, order: int) -> Any:
     """The value (order 0) or slope (order 1) of a series; the slope of an interval is 0."""
     return test[order] if isinstance(test, flint.arb_series) else flint.arb(0) if order else test

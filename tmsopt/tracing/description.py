@@ -91,7 +91,7 @@ def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent
         pattern=str(problem.locate),
         parameters=columns,
         unknowns=dict(zip(pattern.unknowns, points.unknowns, strict=True)),
-        tangent=_natural_tangent(points),
+        tangent=_compute_natural_tangent(points),
         arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))]),
         kinds=kinds,
         stable=points.stable,
@@ -101,11 +101,11 @@ def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent
         events=tuple(event_points),
         closed=walk.closed,
         residual=float(np.max(residual)),
-        eigenfrequency=_eigenfrequency(points),
+        eigenfrequency=_compute_eigenfrequency(points),
     )
 
 
-def _eigenfrequency(points: Points) -> dict[str, Array] | None:
+def _compute_eigenfrequency(points: Points) -> dict[str, Array] | None:
     """The multiple eigenfrequency ω = i s minus the carrier of a complex system; None for a real system."""
     carrier, pattern = points.traced.problem.model.carrier, points.traced.pattern
     if carrier is None:
@@ -153,7 +153,7 @@ def _find_higher_order(name: str, names: set[str]) -> str:
     return f"EP{order + 1}" if ("2EP2" if order == 3 else f"EP{order - 1}+EP2") in names else ""
 
 
-def _natural_tangent(points: Points) -> dict[str, Array]:
+def _compute_natural_tangent(points: Points) -> dict[str, Array]:
     """Derivatives of the free parameters with respect to the arclength, which is in widths of the ranges."""
     problem, speeds = points.traced.problem, points.t * points.traced.curve.scale / (points.speed[:, None] + 1e-300)
     parameter_set = problem.parameter_set
@@ -198,10 +198,10 @@ def _add_exact_EP4(traced: TracedProblem, walk: Walk, located: list[LocatedEvent
             LocatedEvent(_EP4, refined_walk.y[k], refined_walk.t[k], k, 0.0)
             for k in (np.flatnonzero(is_minimum) + 1).tolist()
         ]
-    return [*filter(None, (_exact_EP4(traced, walk, f) for f in candidates)), *located]
+    return [*filter(None, (_solve_EP4(traced, walk, f) for f in candidates)), *located]
 
 
-def _exact_EP4(traced: TracedProblem, walk: Walk, located: LocatedEvent) -> LocatedEvent | None:
+def _solve_EP4(traced: TracedProblem, walk: Walk, located: LocatedEvent) -> LocatedEvent | None:
     """The EP4 next to an event, computed from the equations of an EP4; None without an EP4."""
     problem, pattern, scale = traced.problem, traced.pattern, traced.curve.scale
     free, EP4 = len(problem.free), pattern_of("EP4", problem.model.degree)

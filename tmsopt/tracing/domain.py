@@ -178,9 +178,8 @@ def _bounds_stability(branch: Branch, problem: Posed) -> Truth:
     """
     other_factors = pattern_of(problem.model, branch.pattern).remaining_factors(list(branch.unknowns.values()))
     z = roots_along(other_factors, len(branch))
-    axis_frequency = np.where(is_on_axis(z), np.abs(z) ** 2, -1.0).max(
-        axis=-1, initial=-1.0
-    )  # squared frequency of the fastest pair on the axis
+    # squared frequency of the fastest pair on the axis
+    axis_frequency = np.where(is_on_axis(z), np.abs(z) ** 2, -1.0).max(axis=-1, initial=-1.0)
     if np.all(axis_frequency < 0):
         return branch.stable
     (x, dx, x_width), (y, dy, y_width) = (
@@ -196,14 +195,14 @@ def _bounds_stability(branch: Branch, problem: Posed) -> Truth:
 
 def _parts_instabilities(branch: Branch) -> Truth:
     """Where both sides are unstable, and exactly one side has a positive real root."""
-    other_factor = _other_roots(branch)
+    other_factor = _find_other_factor(branch)
     is_parting = branch.unknowns["r"] > 0 if branch.pattern == "EP2" else ~branch.stable
     if len(other_factor) > 1:
         is_parting[is_parting] = real_roots(np.stack(other_factor, axis=-1)[is_parting])[1] == 0
     return is_parting
 
 
-def _other_roots(branch: Branch) -> list[Any]:
+def _find_other_factor(branch: Branch) -> list[Any]:
     """Along a curve of double roots or of roots 0, the factor of the other roots; [1] without other roots."""
     return [np.ones(len(branch)), *(column for name, column in branch.unknowns.items() if name != "r")]
 
@@ -212,7 +211,7 @@ def _is_drawn_here(branch: Branch) -> Truth:
     """Where r is the larger of two double roots; with the smaller one, the same curve would be drawn twice."""
     if not np.any(branch.kinds == "2EP2"):
         return np.ones(len(branch), dtype=bool)
-    r, second_root = branch.unknowns["r"], nearest_pair_mean(_other_roots(branch))
+    r, second_root = branch.unknowns["r"], nearest_pair_mean(_find_other_factor(branch))
     return np.asarray((branch.kinds != "2EP2") | (r - second_root >= -1e-12 * np.abs(second_root)))
 
 

@@ -106,7 +106,7 @@ def find_seeds(
     fruitless, walk_count, count = 0, len(walks), 0
     held_variables = cycle([None, *range(free)])
     designs = sample_box(problem, seed)
-    while count < (starts if _grid_test(traced) else _MAX_ROUNDS * starts):
+    while count < (starts if _choose_grid_test(traced) else _MAX_ROUNDS * starts):
         for points in _project_designs(
             traced, list(islice(designs, starts)), list(islice(held_variables, starts)), _MAX_GUESSES
         ):
@@ -117,14 +117,14 @@ def find_seeds(
             fruitless, walk_count = (fruitless + 1 if len(walks) == walk_count else 0), len(walks)
 
 
-def _grid_test(traced: TracedProblem) -> Callable[[Sequence[Any]], Any] | None:
+def _choose_grid_test(traced: TracedProblem) -> Callable[[Sequence[Any]], Any] | None:
     """The function whose sign changes on a grid show every branch that is not too short; None without one."""
     return traced.pattern.test if len(traced.problem.free) == 2 else None
 
 
 def find_missed(traced: TracedProblem, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
     """Points of curves that are not walked yet: near sign changes on a grid, and where curves return from infinity."""
-    test = _grid_test(traced)
+    test = _choose_grid_test(traced)
     missed = find_unexplained(traced.problem, traced.curve, test, walks) if test else ()
     for design in chain(missed, _list_designs_beyond_infinity(traced, walks)):
         yield 0, _project_designs(traced, [design])[0]

@@ -113,9 +113,8 @@ class Continuation(Iterator[BranchPoint]):
             first = int(np.flatnonzero(np.all(walk.y == previous_points[-1].y, axis=1))[-1])
             for row in range(first + (not fresh), len(walk.y)):
                 events = [event for at, event in row_events if at == row]
-                is_repeated = (
-                    len(previous_points) == 1 and np.abs(walk.y[row] - start.y).max() <= SAME_PLACE
-                )  # the user turned around at this event
+                # the user turned around at this event
+                is_repeated = len(previous_points) == 1 and np.abs(walk.y[row] - start.y).max() <= SAME_PLACE
                 if (events and not is_repeated) or row == len(walk.y) - 1 or (fresh and row == first):
                     self._last = CurvePoint(walk.y[row], walk.t[row])
                     self._arclength = arclength + self._sign * float(branch.arclength[row] - branch.arclength[first])

@@ -152,9 +152,8 @@ def _choose_rows(problem: Posed, count: int, events: Iterable[EventPoint]) -> Ar
     ]
     grid = np.unique(np.concatenate([np.linspace(low, high, count), *changes]))
     grid = grid[(grid >= low) & (grid <= high)]
-    return np.asarray(
-        grid[np.append(True, np.diff(grid) > _SAME_ROW * (high - low))]
-    )  # an EP4 is an event of several traces
+    # an EP4 is an event of several traces, so values may repeat
+    return np.asarray(grid[np.append(True, np.diff(grid) > _SAME_ROW * (high - low))])
 
 
 def _compute_polynomials(problem: Posed, x: Any) -> Array:

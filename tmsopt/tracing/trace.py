@@ -95,9 +95,8 @@ def trace(
 
     walk_new_curves(traced.curve, points(), (step, most), walks)
     with np.errstate(all="ignore"):  # values near infinity may not be finite
-        branches = [
-            b for w in walks for b in make_branches(traced, w, checked_events) if b.residual <= _MAX_RESIDUAL
-        ]  # never for nan
+        # a residual of nan is never small enough
+        branches = [b for w in walks for b in make_branches(traced, w, checked_events) if b.residual <= _MAX_RESIDUAL]
     branches.sort(key=lambda b: -float(b.arclength[-1]))
     seconds = time.perf_counter() - started
     return Trace(
