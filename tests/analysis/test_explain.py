@@ -76,11 +76,7 @@ def test_least_speed_of_an_ep4_beside_its_closed_form():
 
     free = {"zeta_B": (-1, -0.3), "zeta_H": (-1, -0.1), "Fr": (0.01, 10), "chi_B": (1.2, 5), "lambda_s": (0.02, 1.4)}
     solution, explanation, levers = explained(
-        fixed={"chi_H": 1.0, "mu": 0.1},
-        free=free,
-        minimize="Fr",
-        locate="EP4",
-        constraints={"decay": "omega0 == -1.5"},
+        fixed={"chi_H": 1.0, "mu": 0.1}, free=free, minimize="Fr", locate="EP4", constraints={"decay": "omega0 == -1.5"}
     )
     assert solution.value == pytest.approx(least(1.2, -1.5), rel=1e-11)
     bound, equality = levers["chi_B.min"], levers["decay"]

@@ -78,13 +78,7 @@ def test_what_is_said_of_roots_that_stay_on_the_axis():
     assert "s = 0 is a root for every g" in said
     assert "marginally stable (no root right of the imaginary axis, those on it simple): to 1.4142136" in said
     assert "speed" not in said
-    masses = _speeds(
-        "d",
-        (0.1, 10),
-        M=[[1, 0], [0, 2]],
-        D=[["d", "-d"], ["-d", "d"]],
-        K=[[3, -3], [-3, 3]],
-    )
+    masses = _speeds("d", (0.1, 10), M=[[1, 0], [0, 2]], D=[["d", "-d"], ["-d", "d"]], K=[[3, -3], [-3, 3]])
     said = masses.report()
     assert "2.8284271247461" in said
     assert "s = 0 is a root for every d, 2-fold" in said

@@ -31,19 +31,10 @@ SI = {"w": W, "g": G, "m_B": 10.0, "m_H": 1.0, "x_B": 1.5, "z_B": -0.45, "x_H": 
 
 PLANES = {
     "on the law": (BASE | {"chi_B": SQRT2}, {"Fr": (0.01, 5.0), "lambda_s": (0.01, 1.4)}),
-    "off the law": (
-        BASE | {"lambda_s": math.atan(TAN_EP4) - 0.18},
-        {"Fr": (0.01, 5.0), "chi_B": (0.5, 3.0)},
-    ),
+    "off the law": (BASE | {"lambda_s": math.atan(TAN_EP4) - 0.18}, {"Fr": (0.01, 5.0), "chi_B": (0.5, 3.0)}),
     "above EP4": (BASE | {"Fr": FR_EP4 + 0.5}, {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)}),
-    "chi_H = 1.02": (
-        BASE | {"chi_H": 1.02, "mu": 20.8, "Fr": 2.337},
-        {"chi_B": (1.0, 1.5), "lambda_s": (0.01, 1.4)},
-    ),
-    "chi_H = 0.9": (
-        BASE | {"chi_H": 0.9, "mu": 5.0, "Fr": 2.3},
-        {"chi_B": (1.3, 1.75), "lambda_s": (0.4, 0.6)},
-    ),
+    "chi_H = 1.02": (BASE | {"chi_H": 1.02, "mu": 20.8, "Fr": 2.337}, {"chi_B": (1.0, 1.5), "lambda_s": (0.01, 1.4)}),
+    "chi_H = 0.9": (BASE | {"chi_H": 0.9, "mu": 5.0, "Fr": 2.3}, {"chi_B": (1.3, 1.75), "lambda_s": (0.4, 0.6)}),
     "reversed": (
         {"chi_H": 1.0, "mu": 0.1, "chi_B": 0.75, "zeta_B": -0.2, "zeta_H": -0.4},
         {"Fr": (0.01, 5.0), "lambda_s": (-1.4, -0.01)},

@@ -121,12 +121,7 @@ def evaluate_pencil(model: Model, parameter_set: ParameterSet, values: Mapping[s
 
 
 def refine_root(
-    model: Model,
-    parameter_set: ParameterSet,
-    design: Numbers,
-    widths: Numbers,
-    s: complex,
-    multiplicity: int,
+    model: Model, parameter_set: ParameterSet, design: Numbers, widths: Numbers, s: complex, multiplicity: int
 ) -> RootPoint:
     """A multiple root of the stored parameters: the zero of the derivative of order multiplicity − 1."""
     sizes = {n: width if abs(x) <= _NEAR_ZERO * (width := widths.get(n, 0.0)) else abs(x) for n, x in design.items()}

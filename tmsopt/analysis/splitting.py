@@ -78,10 +78,8 @@ def compute_response(point: RootPoint, name: str) -> Response:
 def _expand_terms(point: RootPoint, name: str) -> list[list[complex]] | None:
     """terms[m][j] of ε^m t^j, with t in the unit of the root; None if they are undefined.
 
-    A term is 0 if it may be 0 within rounding errors.
-
-    With g independent eigenvectors, p is to leading order the determinant of a g × g matrix that vanishes at the root,
-    so terms of total order below g are 0.
+    A term is 0 if it may be 0 within rounding errors. With g independent eigenvectors, the leading terms of p are the
+    determinant of a g × g matrix that is 0 at the root, so terms of total order below g are 0.
     """
     k, g = point.multiplicity, point.geometric
     series = point.perturb(name, flint.arb_series([0, point.step(name)], prec=2 * k + 1), doubt=True)

@@ -44,7 +44,7 @@ class Crossing:
         at: the value of y.
         kind: ``capsize`` (a root 0), ``weave`` (a pair ± iω), ``infinity`` (a root at infinity), ``EP2``, ``EP3``, …
             (a real k-fold root) or ``CEP2``, … (a k-fold pair).
-        root: the root with its multiplicity, or the upper one of a pair; meaningless for ``infinity``.
+        root: the root with its multiplicity, or the upper root of a pair; meaningless for ``infinity``.
         rightmost: whether no other root is farther to the right.
         changes: whether the polynomial is stable, or marginally stable, on exactly one side of y.
     """
@@ -67,7 +67,7 @@ class Crossings:
         always: the kinds that are present for every y: ``weave`` (roots mirrored in the axis), ``EP2`` (a multiple root
             other than 0), ``capsize`` (a root 0), ``infinity``.
         marginal: bands with no root right of the axis and simple roots on it, apart from a root 0 that is present for
-            every y. Empty if `always` is.
+            every y. Empty if `always` is empty.
         zeros: multiplicity of the root 0 that is present for every y.
     """
 
@@ -79,12 +79,12 @@ class Crossings:
     zeros: int = 0
 
 
-def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, bands_alone: bool = False) -> Crossings:
+def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, bands_only: bool = False) -> Crossings:
     """All crossings with lower < y < upper, in exact numbers; upper may be inf.
 
     Args:
         coefficients: coefficients of the polynomial in s, descending, each a polynomial in y.
-        bands_alone: compute only the bands, because the crossings take most of the time.
+        bands_only: compute only the bands, because the crossings take most of the time.
     """
     lower, upper = rational(lower), None if upper == math.inf else rational(upper)
     p = _join_rows([flint.fmpq_poly([*map(rational, c)]) for c in reversed(coefficients)])
@@ -97,21 +97,20 @@ def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, b
     marks = sorted({y for ys in places.values() for y in ys})
     cells = list(_list_cells(marks, lower, upper))
     stable, damped = zip(*(_classify(_evaluate_at(a, middle)) for _, _, middle in cells), strict=True)
-    lasting = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
-    marginal = [any(lasting.values()) and _is_marginal(split, middle) for _, _, middle in cells]
+    permanent = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
+    marginal = [any(permanent.values()) and _is_marginal(split, middle) for _, _, middle in cells]
     is_bounded = [is_stable or is_marginal for is_stable, is_marginal in zip(stable, marginal, strict=True)]
     changed = {float(y): is_bounded[k] != is_bounded[k + 1] for k, y in enumerate(marks)}
-    always = {"infinity": len(a) < len(coefficients)} | lasting
-    event_values = {} if bands_alone else places
-    events = (
-        (y, each)
+    always = {"infinity": len(a) < len(coefficients)} | permanent
+    found = (
+        Crossing(float(y), *event, changed[float(y)])
         for y in marks
-        for kind, ys in event_values.items()
-        if y in ys
-        for each in _find_events(a, split, kind, y)
+        for kind, values in places.items()
+        if y in values
+        for event in _find_events(a, split, kind, y)
     )
     return Crossings(
-        tuple(Crossing(float(y), *each, changed[float(y)]) for y, each in events),
+        () if bands_only else tuple(found),
         _merge_bands(cells, stable),
         _merge_bands(cells, damped),
         tuple(kind for kind, holds in always.items() if holds),

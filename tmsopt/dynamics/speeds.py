@@ -168,7 +168,7 @@ def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
     if name is None or not math.isfinite(parameter_set[name].range.lower):
         return None
     a, ends = coefficients_over(problem, parameter_set, design.parameters, name), parameter_set[name].range
-    return find_crossings(a, ends.lower, ends.upper, bands_alone=True).stable
+    return find_crossings(a, ends.lower, ends.upper, bands_only=True).stable
 
 
 def speed_of(parameter_set: ParameterSet) -> str | None:

@@ -61,10 +61,7 @@ class Evaluation:
 
 
 def recheck(
-    problem: Posed,
-    parameters: Numbers,
-    cases: Sequence[Case] | None = None,
-    robustness: Robustness | None = None,
+    problem: Posed, parameters: Numbers, cases: Sequence[Case] | None = None, robustness: Robustness | None = None
 ) -> Evaluation:
     """Evaluate constraints, pattern, roots and objective of a design in the given cases, independently of any solver.
 

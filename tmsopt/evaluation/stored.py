@@ -55,7 +55,7 @@ class _Cluster:
     """A multiple root on a limit.
 
     Attributes:
-        case: the case that has it.
+        case: the case that has the root.
         root: the root of the ideal design, on or above the real axis.
         direction: unit vector along the limit; the feasible side is on its left.
         equality: whether the limit is an equality.
@@ -156,11 +156,7 @@ def missed_note(problem: Posed, amounts: Numbers) -> tuple[str, ...]:
 
 
 def _find_clusters(
-    problem: Posed,
-    parameters: Numbers,
-    checked: Evaluation,
-    cases: Sequence[Case],
-    names: Sequence[str],
+    problem: Posed, parameters: Numbers, checked: Evaluation, cases: Sequence[Case], names: Sequence[str]
 ) -> list[_Cluster]:
     """The multiple roots that lie on the named limits."""
     limited_names = {name for limit in names for name in problem.conditions[limit].names}

@@ -140,11 +140,7 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
 
 
 def check_options(
-    problem: Posed,
-    step: Any,
-    *counts: tuple[str, Any, int, int | None],
-    through: Any = (),
-    progress: Any = None,
+    problem: Posed, step: Any, *counts: tuple[str, Any, int, int | None], through: Any = (), progress: Any = None
 ) -> None:
     """Check the options of a trace.
 
