@@ -5,9 +5,8 @@ for each system here; where a law is said to hold, the roots themselves are foun
 """
 
 import json
-from math import factorial, sqrt
+from math import comb, factorial, sqrt
 
-import casadi as ca
 import flint
 import numpy as np
 import pytest
@@ -80,9 +79,13 @@ def test_chains_of_matrices_with_a_known_jordan_form(chains, others):
 
 def diagnosis_of(model, **design):
     """The one multiple root of a design of a model's first parameter set."""
-    of = model.sets[0]
-    found = structure([float(c) for c in model.coefficients(design, of)], 1e-11)
-    (diagnosis,) = diagnose_roots(model, of, design, found)
+    return diagnosis_within(model, None, 1e-11, **design)
+
+
+def diagnosis_within(model, free, tolerance=1e-12, **design):
+    """The same for parameters with ranges."""
+    found = structure([float(c) for c in model.coefficients(design, model.sets[0])], tolerance)
+    (diagnosis,) = diagnose_roots(model, model.sets[0], design, found, free)
     return diagnosis
 
 
@@ -90,14 +93,10 @@ def response(diagnosis, name):
     return next(r for r in diagnosis.responses if r.parameter == name)
 
 
-def symbols(names):
-    return [ca.SX.sym(n) for n in names.split()]
-
-
 def test_two_equal_oscillators_are_semisimple():
     """m s² + c s + k twice: two eigenvectors; k₁ moves one root by −k₁ ε/(2 m s + c), and leaves the other."""
-    m, c, k1, k2, kappa = symbols("m c k1 k2 kappa")
-    model = from_matrices([[m, 0], [0, m]], [[c, 0], [0, c]], [[k1 + kappa, -kappa], [-kappa, k2 + kappa]])
+    K = [["k1 + kappa", "-kappa"], ["-kappa", "k2 + kappa"]]
+    model = from_matrices([["m", 0], [0, "m"]], [["c", 0], [0, "c"]], K)
     found = diagnosis_of(model, m=2.0, c=0.6, k1=7.0, k2=7.0, kappa=0.0)
     s0 = complex(found.re, found.im)
     assert s0 == pytest.approx((-0.6 + sqrt(56 - 0.36) * 1j) / 4, rel=1e-14)
@@ -116,25 +115,23 @@ def test_two_equal_oscillators_are_semisimple():
 
 def test_oscillators_equal_but_for_a_millionth_have_two_eigenvectors():
     """Their polynomial is 1e-13 from a double pair; the matrix there is the root of that from rank 0."""
-    k1, k2 = symbols("k1 k2")
-    model = from_matrices([[1, 0], [0, 1]], [[0.6, 0], [0, 0.6]], [[k1, 0], [0, k2]])
+    model = from_matrices([[1, 0], [0, 1]], [[0.6, 0], [0, 0.6]], [["k1", 0], [0, "k2"]])
     found = diagnosis_of(model, k1=7.0, k2=7.0 * (1 + 1e-6))
     assert (found.kind, found.geometric, found.partial) == ("semisimple", 2, (1, 1))
 
 
 def test_a_slope_that_is_rounding_moves_nothing():
     """(s + 1)² = x (2y² − 1): at y = √½ in doubles the slope is 2e-16, and at y = √½ none."""
-    x, y = symbols("x y")
-    found = diagnosis_of(from_coefficients([1, 2, 1 - x * (2 * y * y - 1)]), x=0.0, y=sqrt(0.5))
+    found = diagnosis_of(from_coefficients([1, 2, "1 - x*(2*y*y - 1)"]), x=0.0, y=sqrt(0.5))
     assert 2 * sqrt(0.5) ** 2 != 1
     assert response(found, "x") == Response("x", False, (), 2)
 
 
 def test_six_uncoupled_oscillators_with_critical_damping():
     """(s² + c s + 1)⁶ at c = 2: six chains of two, each moved by t² = 2 ε for c (1 + ε)."""
-    c, k = symbols("c k")
-    eye = np.eye(6, dtype=int).tolist()
-    model = from_matrices(eye, [[c * x for x in row] for row in eye], [[k * x for x in row] for row in eye])
+    eye = np.eye(6, dtype=int)
+    damping, stiffness = (np.where(eye, name, "0").tolist() for name in "ck")
+    model = from_matrices(eye.tolist(), damping, stiffness)
     found = diagnosis_of(model, c=2.0, k=1.0)
     assert (found.kind, found.algebraic, found.partial) == ("partly defective", 12, (2,) * 6)
     law = response(found, "c").laws[0].branches
@@ -144,8 +141,7 @@ def test_six_uncoupled_oscillators_with_critical_damping():
 
 def test_the_sixfold_root_of_two_masses_and_a_controller():
     """(s⁴ + 2s²)(x0 + x1 s + s²) + y0 + y1 s + y2 s² = (s + r)⁶ with r = √15/5; y0 (1 + ε): t⁶ = −r⁶ ε exactly."""
-    x0, x1, y0, y1, y2 = symbols("x0 x1 y0 y1 y2")
-    model = from_coefficients([1, x1, x0 + 2, 2 * x1, 2 * x0 + y2, y1, y0])
+    model = from_coefficients([1, "x1", "x0 + 2", "2*x1", "2*x0 + y2", "y1", "y0"])
     r = sqrt(15) / 5
     free = {"x0": 15 * r**2 - 2, "x1": 6 * r, "y0": r**6, "y1": 6 * r**5, "y2": 15 * r**4 - 2 * (15 * r**2 - 2)}
     found = diagnosis_of(model, **free)
@@ -157,8 +153,7 @@ def test_the_sixfold_root_of_two_masses_and_a_controller():
 
 
 def test_chains_two_and_one_of_a_threefold_root():
-    d, f = symbols("d f")
-    found = diagnosis_of(from_matrices(A=[[-1, 1, 0], [d, -1, 0], [0, 0, -1 + f]]), d=0.0, f=0.0)
+    found = diagnosis_of(from_matrices(A=[[-1, 1, 0], ["d", -1, 0], [0, 0, "f - 1"]]), d=0.0, f=0.0)
     assert (found.kind, found.algebraic, found.geometric, found.partial) == ("partly defective", 3, 2, (2, 1))
     assert [(r.parameter, r.unmoved, str(r.laws[0].branches.exponent)) for r in found.responses] == [
         ("d", 1, "1/2"),
@@ -168,8 +163,7 @@ def test_chains_two_and_one_of_a_threefold_root():
 
 def test_a_bare_polynomial_has_one_chain_and_may_move_linearly():
     """(s + 1)² = x²: one chain of a companion matrix, and yet two roots ± x, for ∂p/∂x = 0."""
-    (x,) = symbols("x")
-    found = diagnosis_of(from_coefficients([1, 2, 1 - x * x]), x=0.0)
+    found = diagnosis_of(from_coefficients([1, 2, "1 - x**2"]), x=0.0)
     assert (found.geometric, found.jordan, found.kind) == (1, None, "defective")
     law = found.responses[0].laws[0]
     assert str(law.branches.exponent) == "1"
@@ -179,8 +173,7 @@ def test_a_bare_polynomial_has_one_chain_and_may_move_linearly():
 
 def test_flutter_of_the_undamped_ziegler_pendulum():
     """2 s⁴ + (7 − 2P) s² + 1 with P = 7/2 − √2: s0⁴ = 1/2 and t² = P ε/4 (masses 2 and 1, springs and length 1)."""
-    (P,) = symbols("P")
-    model = from_matrices(M=[[3, 1], [1, 1]], K=[[2 - P, P - 1], [-1, 1]])
+    model = from_matrices(M=[[3, 1], [1, 1]], K=[["2 - P", "P - 1"], [-1, 1]])
     critical = 3.5 - sqrt(2)
     found = diagnosis_of(model, P=critical)
     assert (found.algebraic, found.geometric, found.kind) == (2, 1, "defective")
@@ -194,8 +187,7 @@ def test_the_law_holds_farther_on_one_side():
 
     Sampled are 0.1, which is between them, and 0.1^(5/4).
     """
-    (x,) = symbols("x")
-    (law,) = diagnosis_of(from_coefficients([1, 2, 1 - x - 2 * x * x]), x=0.0).responses[0].laws
+    (law,) = diagnosis_of(from_coefficients([1, 2, "1 - x - 2*x**2"]), x=0.0).responses[0].laws
     assert (law.below, law.above) == (pytest.approx(10**-1.25), pytest.approx(0.1))
 
 
@@ -204,10 +196,8 @@ def test_the_law_holds_farther_on_one_side():
 
 def test_a_crossing_that_is_met_to_less_than_its_digits_moves_linearly():
     """[[d, k], [k, −d]] has ω = ±√(d² + k²): a double root at d = k = 0 alone, which coefficients meet to their root."""
-    model = from_hamiltonian([["d", "k"], ["k", "-d"]]).within({"d": (-1, 1), "k": (-1, 1)})
-    at = {"d": -6.5e-10, "k": -3.1e-10}
-    found = structure([float(c) for c in model.coefficients(at)], 1e-12)
-    (diagnosis,) = diagnose_roots(model, model.sets[0], at, found, {"d": (-1, 1), "k": (-1, 1)})
+    free = {"d": (-1, 1), "k": (-1, 1)}
+    diagnosis = diagnosis_within(from_hamiltonian([["d", "k"], ["k", "-d"]]).within(free), free, d=-6.5e-10, k=-3.1e-10)
     assert (diagnosis.kind, diagnosis.eigenfrequency) == ("semisimple", 0)
     for answer in diagnosis.responses:
         (law,) = answer.laws
@@ -217,11 +207,8 @@ def test_a_crossing_that_is_met_to_less_than_its_digits_moves_linearly():
 
 def test_equal_oscillators_that_are_met_to_their_sixth_digit_move_linearly():
     """As above: k₂ moves one root by k ε/(2 √(k − c²/4)), and the other stays."""
-    m, c, k1, k2 = symbols("m c k1 k2")
-    model = from_matrices([[m, 0], [0, 1]], [[c, 0], [0, c]], [[k1, 0], [0, k2]])
-    at = {"m": 1.0, "c": 0.1, "k1": 2.0, "k2": 2.0000009}
-    found = structure([float(x) for x in model.coefficients(at)], 1e-12)
-    (diagnosis,) = diagnose_roots(model, model.sets[0], at, found, {"k2": (1, 3)})
+    model = from_matrices([["m", 0], [0, 1]], [["c", 0], [0, "c"]], [["k1", 0], [0, "k2"]])
+    diagnosis = diagnosis_within(model, {"k2": (1, 3)}, m=1.0, c=0.1, k1=2.0, k2=2.0000009)
     assert diagnosis.im == pytest.approx(sqrt(2 - 0.0025), rel=1e-14)
     (law,) = response(diagnosis, "k2").laws
     assert (str(law.branches.exponent), law.branches.roots, response(diagnosis, "k2").unmoved) == ("1", 1, 1)
@@ -230,10 +217,8 @@ def test_equal_oscillators_that_are_met_to_their_sixth_digit_move_linearly():
 
 def test_a_singular_exceptional_point_moves_linearly():
     """[[a + ib, 1], [0, 0]] has ω = a + ib and 0, one Jordan block at a = b = 0."""
-    model = from_hamiltonian([["a + 1j*b", 1], [0, 0]]).within({"a": (-1, 1), "b": (-1, 1)})
-    at = {"a": 5.2e-8, "b": 6e-30}
-    found = structure([float(c) for c in model.coefficients(at)], 1e-12)
-    (diagnosis,) = diagnose_roots(model, model.sets[0], at, found, {"a": (-1, 1), "b": (-1, 1)})
+    free = {"a": (-1, 1), "b": (-1, 1)}
+    diagnosis = diagnosis_within(from_hamiltonian([["a + 1j*b", 1], [0, 0]]).within(free), free, a=5.2e-8, b=6e-30)
     assert (diagnosis.geometric, diagnosis.eigenfrequency) == (1, 0)
     for answer in diagnosis.responses:
         (law,) = answer.laws
@@ -243,8 +228,7 @@ def test_a_singular_exceptional_point_moves_linearly():
 
 def test_what_has_no_power_series_is_not_resolved():
     """(s + 1)² = √x + y: at x = 0 the slope in x is infinite."""
-    x, y = symbols("x y")
-    found = diagnosis_of(from_coefficients([1, 2, 1 - ca.sqrt(x) - y]), x=0.0, y=0.0)
+    found = diagnosis_of(from_coefficients([1, 2, "1 - sqrt(x) - y"]), x=0.0, y=0.0)
     assert response(found, "x") == Response("x", False, (), 0, 2)
     assert str(response(found, "y").laws[0].branches.exponent) == "1/2"
     assert "not resolved for x" in str(found)
@@ -252,16 +236,14 @@ def test_what_has_no_power_series_is_not_resolved():
 
 def test_orders_beyond_ten_count():
     """(s + 1)¹² + x¹¹ − y: by x the roots move as ε^(11/12), by y as ε^(1/12)."""
-    x, y = symbols("x y")
-    binomials = [1, 12, 66, 220, 495, 792, 924, 792, 495, 220, 66, 12]
-    found = diagnosis_of(from_coefficients([*binomials, 1 + x**11 - y]), x=0.0, y=0.0)
+    binomials = [comb(12, k) for k in range(12)]
+    found = diagnosis_of(from_coefficients([*binomials, "1 + x**11 - y"]), x=0.0, y=0.0)
     assert [str(response(found, n).laws[0].branches.exponent) for n in "xy"] == ["11/12", "1/12"]
 
 
 def test_every_parameter_is_listed_with_its_law_by_how_far_it_moves_the_root():
     """(s + 1)² = a + 4b + c²: t² = 4ε moves farther than t² = ε, and t = ±ε least."""
-    a, b, c = symbols("a b c")
-    found = diagnosis_of(from_coefficients([1, 2, 1 - a - 4 * b - c * c]), a=0.0, b=0.0, c=0.0)
+    found = diagnosis_of(from_coefficients([1, 2, "1 - a - 4*b - c**2"]), a=0.0, b=0.0, c=0.0)
     assert [r.parameter for r in found.responses] == ["b", "a", "c"]
     line = " ".join(str(found).split())
     assert "of b moves it by 2 ε^(1/2)" in line
@@ -302,7 +284,6 @@ def changed(design, name, eps):
 def test_the_bicycle_has_one_chain_of_four(bicycle):
     assert (bicycle.kind, bicycle.algebraic, bicycle.geometric, bicycle.partial) == ("defective", 4, 1, (4,))
     assert bicycle.re == pytest.approx(-(0.08 ** (-0.25)), rel=1e-15)
-    assert bicycle.jordan is not None
     assert bicycle.jordan.zero < 1e-15
     assert bicycle.jordan.nonzero > 1e-2
 
@@ -348,13 +329,13 @@ def test_the_mass_ratio_does_not_move_it(bicycle):
 
 
 def test_a_solution_says_what_its_multiple_root_is():
-    solution = tmsopt.solve(tmsopt.load("problems/ep4.toml"))
+    solution = tmsopt.solve("problems/ep4.toml")
     (found,) = tmsopt.diagnose(solution)
     assert (found.kind, found.partial) == ("defective", (4,))
     assert json.loads(json.dumps(found.to_json(), allow_nan=False))["responses"][0]["laws"][0]["exponent"] == "1/4"
-    text = splitting = " ".join(str(found).split())
+    text = " ".join(str(found).split())
     assert text.startswith("4-fold root -1.8803015: defective, Jordan chain of length 4 (1 independent eigenvector")
-    assert "ε^(1/4)" in splitting
+    assert "ε^(1/4)" in text
 
 
 def test_all_designs_take_no_diagnosis():

@@ -57,7 +57,7 @@ def cep2():
 
 @pytest.fixture(scope="module")
 def realistic():
-    return tmsopt.solve(tmsopt.load("problems/realistic.toml"))
+    return tmsopt.solve("problems/realistic.toml")
 
 
 def moved_abscissa(solution, factor, extra, scale):
@@ -162,7 +162,7 @@ def test_shares_of_the_line_add_up():
 @pytest.mark.slow
 def test_multipliers_of_limits_are_those_of_the_solver(realistic):
     """Two routes to one number: Newton's method on the factors t² + βt + κ, and least squares on those of the line."""
-    for solution in (realistic, tmsopt.solve(tmsopt.load("problems/point_mass_robot.toml"))):
+    for solution in (realistic, tmsopt.solve("problems/point_mass_robot.toml")):
         found = judged(solution)
         assert (found.verdict, found.order) == (STRICT, 1)
         assert dict(found.limits) == pytest.approx(dict(solution.active), rel=1e-6)

@@ -22,6 +22,10 @@ PROBLEMS = Path(__file__).parents[2] / "problems"
 BENCHMARK = PROBLEMS / "whipple_benchmark.toml"
 
 
+def column(motion, name):
+    return np.array(motion[name])
+
+
 @cache
 def ep4():
     return tmsopt.solve(PROBLEMS / "ep4.toml")
@@ -62,7 +66,7 @@ def test_a_critically_damped_push_peaks_at_1_over_e():
     assert found.overshoot == 0
     assert found.settling == pytest.approx(float(-mp.lambertw(-0.02 / mp.e, -1).real), rel=1e-11)
     assert motion["t"][-1] == pytest.approx(1.2 * found.settling, rel=0.1)
-    assert np.array(motion["q1"]) == pytest.approx(np.array(motion["t"]) * np.exp(-np.array(motion["t"])), abs=1e-14)
+    assert column(motion, "q1") == pytest.approx(column(motion, "t") * np.exp(-column(motion, "t")), abs=1e-14)
 
 
 def test_measures_do_not_know_the_step_nor_how_long_is_shown():
@@ -165,7 +169,7 @@ def test_noise_and_a_push_add_up():
     parts = [tmsopt.simulate(BENCHMARK, **one, **asked) for one in ({"lean": 5}, {"noise": 1.0})]
     for name in both.columns:
         if name not in ("t", "x"):
-            assert np.array(both[name]) == pytest.approx(sum(np.array(m[name]) for m in parts), abs=1e-11)
+            assert column(both, name) == pytest.approx(sum(column(m, name) for m in parts), abs=1e-11)
 
 
 # Shapes of modes

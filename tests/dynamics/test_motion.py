@@ -19,6 +19,10 @@ BENCHMARK, EP4 = PROBLEMS / "whipple_benchmark.toml", PROBLEMS / "ep4.toml"
 STATES = ("phi", "delta", "phidot", "deltadot")
 
 
+def column(motion, name):
+    return np.array(motion[name])
+
+
 @cache
 def ep4():
     return tmsopt.solve(EP4)
@@ -58,11 +62,11 @@ def test_the_benchmark_moves_as_an_integrator_says():
     p = motion.parameters
     M = np.array(canonical(p)[0], dtype=float)
     start = np.r_[math.radians(5), -math.radians(2), np.linalg.solve(M, [4.0, 0.3]), 0, 0]
-    found = integrated(rolling(p), start, np.array(motion["t"]))
+    found = integrated(rolling(p), start, column(motion, "t"))
     assert table(motion, (*STATES, "psi", "y_rear")) == pytest.approx(found, abs=1e-10)
     front = found[5] + p["w"] * found[4] - p["c"] * math.cos(p["lambda_s"]) * found[1]
-    assert np.array(motion["y_front"]) == pytest.approx(front, abs=1e-10)
-    assert np.array(motion["x"]) == pytest.approx(p["v"] * np.array(motion["t"]), rel=1e-15)
+    assert column(motion, "y_front") == pytest.approx(front, abs=1e-10)
+    assert column(motion, "x") == pytest.approx(p["v"] * column(motion, "t"), rel=1e-15)
 
 
 def test_a_dimensionless_bicycle_moves_as_an_integrator_says():
@@ -76,7 +80,7 @@ def test_a_dimensionless_bicycle_moves_as_an_integrator_says():
         return np.r_[x[2:4], -np.linalg.solve(M, V @ x[2:4] + P @ x[:2]), turn, p["Fr"] * x[4]]
 
     start = np.r_[math.radians(3), 0, np.linalg.solve(M, [0, 0.001]), 0, 0]
-    found = integrated(right, start, np.array(motion["t"]))
+    found = integrated(right, start, column(motion, "t"))
     assert table(motion, (*STATES, "psi", "y_rear")) == pytest.approx(found, abs=1e-10)
 
 
@@ -163,12 +167,12 @@ def test_at_the_capsize_speed_it_rides_a_circle():
     lean, steer = -K[0, 1] / K[0, 0], 1.0
     start = {"phi": 0.01 * lean, "delta": 0.01 * steer}
     motion = tmsopt.simulate(tmsopt.Problem(whipple, fixed=p), start=start, seconds=4)
-    t, turn = np.array(motion["t"]), fast * 0.01 * math.cos(p["lambda_s"]) / p["w"]
-    assert np.array(motion["delta"]) == pytest.approx(0.01, rel=1e-9)  # the speed is rounded
-    assert np.array(motion["psi"]) == pytest.approx(turn * t, abs=1e-9)
-    assert np.array(motion["y_rear"]) == pytest.approx(fast * turn * t**2 / 2, abs=1e-8)
+    t, turn = column(motion, "t"), fast * 0.01 * math.cos(p["lambda_s"]) / p["w"]
+    assert column(motion, "delta") == pytest.approx(0.01, rel=1e-9)  # the speed is rounded
+    assert column(motion, "psi") == pytest.approx(turn * t, abs=1e-9)
+    assert column(motion, "y_rear") == pytest.approx(fast * turn * t**2 / 2, abs=1e-8)
     apart = p["w"] * turn * t - p["c"] * math.cos(p["lambda_s"]) * 0.01
-    assert np.array(motion["y_front"]) - np.array(motion["y_rear"]) == pytest.approx(apart, abs=1e-8)
+    assert column(motion, "y_front") - column(motion, "y_rear") == pytest.approx(apart, abs=1e-8)
     speeds = [m for m in motion.modes if abs(m.re) < 1e-6 and m.im == 0]
     assert [m.steer_per_lean for m in speeds] == pytest.approx([steer / lean], rel=1e-6)
 
@@ -209,10 +213,10 @@ def test_a_controller_steers_and_its_torque_is_told(lag):
         return np.r_[moved, [] if lag is None else [(-x[6] - GAINS @ x[:4]) / lag]]
 
     start = np.r_[math.radians(4), 0, np.linalg.solve(M, [0, 0.2]), 0, 0, [] if lag is None else [0.0]]
-    found = integrated(right, start, np.array(motion["t"]))
+    found = integrated(right, start, column(motion, "t"))
     assert table(motion, (*STATES, "psi", "y_rear")) == pytest.approx(found[:6], abs=1e-10)
     torque = -GAINS @ found[:4] if lag is None else found[6]
-    assert np.array(motion["T_delta"]) == pytest.approx(torque, abs=1e-9)
+    assert column(motion, "T_delta") == pytest.approx(torque, abs=1e-9)
     assert "T_phi" not in motion.columns
     assert motion.names == ("t", *STATES)
     (peak,) = (m for m in motion.measures if m.name == "T_delta")
@@ -232,7 +236,7 @@ def test_a_motor_of_skates_has_its_torque_in_newton_metres(lag):
     skates, same = (tmsopt.simulate(q, **asked) for q in (driven, wheels))
     for name in (*STATES, "T_delta", "psi", "y_rear", "y_front"):
         scale = np.abs(same[name]).max()
-        assert np.array(skates[name]) / scale == pytest.approx(np.array(same[name]) / scale, abs=1e-10), name
+        assert column(skates, name) / scale == pytest.approx(column(same, name) / scale, abs=1e-10), name
     assert skates.units["T_delta"] == "N m"
 
 
@@ -285,14 +289,14 @@ def test_growth_beyond_all_numbers_is_refused():
         tmsopt.simulate(falling, seconds=1000)
     motion = tmsopt.simulate(falling)
     assert (motion.stable, motion.to_json()["measures"]["q1"]["settling"]) == (False, None)
-    assert np.array(motion["q1"]) == pytest.approx(np.cosh(2 * np.array(motion["t"])), rel=1e-12)
+    assert column(motion, "q1") == pytest.approx(np.cosh(2 * column(motion, "t")), rel=1e-12)
 
 
 def test_a_mass_alone_rolls_on():
     """Both roots 0, one chain: q = q′(0) t."""
     alone = tmsopt.Problem(from_matrices(M=[["m"]], K=[[0]]), fixed={"m": 3.0})
     motion = tmsopt.simulate(alone, start={"q1dot": 2}, seconds=7)
-    assert np.array(motion["q1"]) == pytest.approx(2 * np.array(motion["t"]), rel=1e-14)
+    assert column(motion, "q1") == pytest.approx(2 * column(motion, "t"), rel=1e-14)
     assert [(m.multiplicity, m.partial) for m in motion.modes] == [(2, (2,))]
     (found,) = tmsopt.diagnose(alone)
     assert [(r.parameter, r.unmoved, r.laws) for r in found.responses] == [("m", 2, ())]
@@ -306,7 +310,7 @@ def test_what_dies_out_too_slowly_to_be_followed_has_no_settling_time():
     assert math.isnan(motion.measures[0].settling)
     at = [float(t) for t in motion["t"]]
     whole = [math.exp(-300 * t) * math.cos(900 * t) + 0.05 * math.exp(-0.001 * t) * math.sin(t) for t in at]
-    assert np.array(motion["x1"]) == pytest.approx(whole, abs=1e-12)
+    assert column(motion, "x1") == pytest.approx(whole, abs=1e-12)
 
 
 def test_a_root_that_is_rounding_gives_no_settling_time():

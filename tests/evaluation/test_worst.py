@@ -22,6 +22,14 @@ def fixed(design=DESIGN, **asked):
     return tmsopt.Problem(TMS, fixed={n: v for n, v in design.items() if n not in asked.get("scenarios", {})}, **asked)
 
 
+def worst_cases(problem):
+    return find_worst_cases(problem.posed, problem.posed.ordered({}))
+
+
+def prove(problem, limit, **options):
+    return prove_worst_case(problem.posed, problem.posed.ordered({}), limit, **options)
+
+
 def sampled(problem, design, quantity, steps):
     """A root quantity over a grid of all bands and tolerances, `steps` each."""
     axes, names = [], []
@@ -65,7 +73,7 @@ VARIED = [
 def test_worst_case_is_never_better_than_a_dense_sample(varied, steps):
     for design in some_designs(2, seed=steps):
         problem = fixed(design, **varied, constraints={"sway": "damping_ratio >= -2"})
-        found = find_worst_cases(problem.posed, problem.posed.ordered({}))
+        found = worst_cases(problem)
         for name, quantity, sign in (("abscissa", hunt.abscissa, 1), ("damping_ratio", hunt.damping_ratio, -1)):
             dense = float((sign * sampled(problem, design, quantity, steps)).max())
             assert sign * found[name].value >= dense - 1e-9 * max(1, abs(dense))
@@ -91,7 +99,7 @@ def test_a_worst_case_on_an_edge_of_the_box_and_in_it():
         "low": f"{x} >= 0",
     }
     problem = fixed(tolerances=tolerances, constraints=asked)
-    found = find_worst_cases(problem.posed, problem.posed.ordered({}))
+    found = worst_cases(problem)
     assert found["constraint peak"].value == pytest.approx(-1, abs=1e-12)
     assert found["constraint ridge"].value == pytest.approx(1, abs=1e-12)  # at x = 0.3 on the edge y = 1
     assert found["constraint ridge"].case.offset["mu"] == pytest.approx(0.05, abs=1e-15)
@@ -103,7 +111,7 @@ def test_an_infinite_root_is_the_worst_there_is():
     """a0 = 0 at T = (chi_H − 1)/zeta_H, inside the band: its roots go to infinity on one side of it."""
     design = {**DESIGN, "chi_H": 0.98}
     problem = fixed({**design}, scenarios={"lambda_s": [0.05, float(np.arctan(0.1)), 0.4]})
-    worst = find_worst_cases(problem.posed, problem.posed.ordered({}))["abscissa"]
+    worst = worst_cases(problem)["abscissa"]
     assert worst.value > 1e6 or not np.isfinite(worst.value)
 
 
@@ -114,34 +122,32 @@ def test_an_infinite_root_is_the_worst_there_is():
 def test_a_proven_limit_is_never_below_a_dense_sample(varied, steps):
     for design in some_designs(2, seed=7 * steps):
         problem = fixed(design, **varied)
-        worst = find_worst_cases(problem.posed, problem.posed.ordered({}))["abscissa"].value
-        found = prove_worst_case(problem.posed, problem.posed.ordered({}), worst, boxes=600)
+        worst = worst_cases(problem)["abscissa"].value
+        found = prove(problem, worst, boxes=600)
         assert found.limit >= worst
         assert found.limit == pytest.approx(worst, abs=2e-6 * (1 + abs(worst)))
         if found.proven:
             assert float(sampled(problem, design, hunt.abscissa, steps).max()) <= found.limit
-        low = prove_worst_case(problem.posed, problem.posed.ordered({}), worst - 1e-3 * (1 + abs(worst)), boxes=60)
+        low = prove(problem, worst - 1e-3 * (1 + abs(worst)), boxes=60)
         assert not low.proven
 
 
 def test_a_band_is_proven_in_a_few_boxes_and_not_when_they_are_too_few():
     problem = fixed(scenarios={"Fr": Band(1.2, 2.4)})
-    worst = find_worst_cases(problem.posed, problem.posed.ordered({}))["abscissa"].value
-    found = prove_worst_case(problem.posed, problem.posed.ordered({}), worst)
+    worst = worst_cases(problem)["abscissa"].value
+    found = prove(problem, worst)
     assert found.proven
     assert found.boxes > 1
-    assert not prove_worst_case(problem.posed, problem.posed.ordered({}), worst, boxes=found.boxes - 1).proven
+    assert not prove(problem, worst, boxes=found.boxes - 1).proven
 
 
 def test_a_singular_mass_matrix_in_a_band_is_not_proven():
     """a0 vanishes where tan lambda_s = (chi_H − 1)/zeta_H: 0.1 here, whatever the limit that is asked."""
     problem = fixed({**DESIGN, "chi_H": 0.98}, scenarios={"lambda_s": Band(0.05, 0.3)})
     for limit in (0.0, 1.0, 1e6):
-        assert not prove_worst_case(problem.posed, problem.posed.ordered({}), limit, boxes=300).proven
+        assert not prove(problem, limit, boxes=300).proven
     clear = fixed({**DESIGN, "chi_H": 0.98}, scenarios={"lambda_s": Band(0.2, 0.3)})
-    assert prove_worst_case(
-        clear.posed, clear.posed.ordered({}), find_worst_cases(clear.posed, clear.posed.ordered({}))["abscissa"].value
-    ).proven
+    assert prove(clear, worst_cases(clear)["abscissa"].value).proven
 
 
 def test_backward_tilts_are_proven_too():
@@ -150,8 +156,8 @@ def test_backward_tilts_are_proven_too():
     worst = []
     for design, band in ((DESIGN, Band(1.2, 2.4)), (dual, Band(1.2 / 1.3, 2.4 / 1.3))):
         problem = fixed(design, scenarios={"Fr": band})
-        worst.append(find_worst_cases(problem.posed, problem.posed.ordered({}))["abscissa"].value)
-        assert prove_worst_case(problem.posed, problem.posed.ordered({}), worst[-1]).proven
+        worst.append(worst_cases(problem)["abscissa"].value)
+        assert prove(problem, worst[-1]).proven
     assert dual["lambda_s"] < 0
     assert worst[0] == pytest.approx(worst[1], abs=1e-9)
 
@@ -160,10 +166,10 @@ def test_separate_values_ask_nothing_in_between():
     problem = fixed(scenarios={"Fr": Band(1.2, 2.4)})
     separate = replace(problem, scenarios={"Fr": (1.8, 2.4)})
     ends = hunt.abscissa({**DESIGN, "Fr": np.array([1.8, 2.4])}).max()
-    found = find_worst_cases(separate.posed, separate.posed.ordered({}))["abscissa"]
+    found = worst_cases(separate)["abscissa"]
     assert found.value == pytest.approx(float(ends), abs=1e-9)
-    assert prove_worst_case(separate.posed, separate.posed.ordered({}), found.value).boxes == 2
-    assert find_worst_cases(problem.posed, problem.posed.ordered({}))["abscissa"].value > found.value + 1e-2
+    assert prove(separate, found.value).boxes == 2
+    assert worst_cases(problem)["abscissa"].value > found.value + 1e-2
 
 
 # Evaluated
@@ -185,7 +191,7 @@ def test_a_problem_with_nothing_free_is_evaluated_at_its_worst():
     report = json.loads(json.dumps(design.to_json()))
     assert report["worst_case"]["at"] == pytest.approx({"Fr": 1.5 + 0.8 * dense.argmax() / 20000}, abs=1e-4)
     assert report["cover"]["proven"]
-    found = find_worst_cases(problem.posed, problem.posed.ordered({}))["objective"]
+    found = worst_cases(problem)["objective"]
     assert found.value == pytest.approx(design.value, abs=1e-8)
     slow = tmsopt.solve(replace(problem, constraints={"fast": "Fr >= 1.6"}), throw=False)
     assert slow.status == "infeasible"

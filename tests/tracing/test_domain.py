@@ -31,19 +31,10 @@ SI = {"w": W, "g": G, "m_B": 10.0, "m_H": 1.0, "x_B": 1.5, "z_B": -0.45, "x_H": 
 
 PLANES = {
     "on the law": (BASE | {"chi_B": SQRT2}, {"Fr": (0.01, 5.0), "lambda_s": (0.01, 1.4)}),
-    "off the law": (
-        BASE | {"lambda_s": math.atan(TAN_EP4) - 0.18},
-        {"Fr": (0.01, 5.0), "chi_B": (0.5, 3.0)},
-    ),
+    "off the law": (BASE | {"lambda_s": math.atan(TAN_EP4) - 0.18}, {"Fr": (0.01, 5.0), "chi_B": (0.5, 3.0)}),
     "above EP4": (BASE | {"Fr": FR_EP4 + 0.5}, {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)}),
-    "chi_H = 1.02": (
-        {"chi_H": 1.02, "mu": 20.8, "Fr": 2.337, "zeta_B": -0.4, "zeta_H": -0.2},
-        {"chi_B": (1.0, 1.5), "lambda_s": (0.01, 1.4)},
-    ),
-    "chi_H = 0.9": (
-        {"chi_H": 0.9, "mu": 5.0, "Fr": 2.3, "zeta_B": -0.4, "zeta_H": -0.2},
-        {"chi_B": (1.3, 1.75), "lambda_s": (0.4, 0.6)},
-    ),
+    "chi_H = 1.02": (BASE | {"chi_H": 1.02, "mu": 20.8, "Fr": 2.337}, {"chi_B": (1.0, 1.5), "lambda_s": (0.01, 1.4)}),
+    "chi_H = 0.9": (BASE | {"chi_H": 0.9, "mu": 5.0, "Fr": 2.3}, {"chi_B": (1.3, 1.75), "lambda_s": (0.4, 0.6)}),
     "reversed": (
         {"chi_H": 1.0, "mu": 0.1, "chi_B": 0.75, "zeta_B": -0.2, "zeta_H": -0.4},
         {"Fr": (0.01, 5.0), "lambda_s": (-1.4, -0.01)},
@@ -328,11 +319,10 @@ def test_a_root_0_and_one_at_infinity_meet_in_a_corner():
 
 def _absorber(**free):
     """A damped mass on an undamped one: stable wherever the damper is, its force does no work only at c = 0."""
-    import casadi as ca
-
-    c, w, mu = ca.SX.sym("c"), ca.SX.sym("w"), 0.1
-    k = mu * w**2
-    model = tmsopt.models.from_matrices([[1, 0], [0, mu]], [[c, -c], [-c, c]], [[1 + k, -k], [-k, k]])
+    k = "0.1*w**2"
+    model = tmsopt.models.from_matrices(
+        [[1, 0], [0, 0.1]], [["c", "-c"], ["-c", "c"]], [[f"1 + {k}", f"-{k}"], [f"-{k}", k]]
+    )
     return tmsopt.Problem(model, free=free)
 
 
@@ -354,9 +344,6 @@ def test_the_same_boundary_inside_the_box_is_drawn():
 
 def test_a_line_on_which_both_sides_are_unstable_bounds_nothing():
     """Pairs of two oscillators with dampings c and −c: on c = 0 both lie on the axis, beside it one is unstable."""
-    import casadi as ca
-
-    c, w = ca.SX.sym("c"), ca.SX.sym("w")
-    model = tmsopt.models.from_matrices([[1, 0], [0, 1]], [[c, 0], [0, -c]], [[1, 0], [0, w * w]])
+    model = tmsopt.models.from_matrices([[1, 0], [0, 1]], [["c", 0], [0, "-c"]], [[1, 0], [0, "w*w"]])
     found = domain(tmsopt.Problem(model, free={"c": (-0.5, 1.0), "w": (1.2, 2.0)}), starts=12)
     assert found.stability == ()

@@ -34,6 +34,10 @@ def circle():
     return Problem(model, free={"x": (-2.0, 2.0), "y": (-2.0, 2.0)}, locate="EP2")
 
 
+def traced(*events):
+    return tmsopt.trace(EP_SET, events=events, **FEW)
+
+
 def by_name(found, name):
     return [e for e in found.events if e.name == name]
 
@@ -42,7 +46,7 @@ def by_name(found, name):
 
 
 def test_an_event_is_located_to_rounding_and_is_a_point_of_its_branch():
-    found = tmsopt.trace(EP_SET, events=[HALF, FAST], **FEW)
+    found = traced(HALF, FAST)
     (half,), fast, (branch,) = by_name(found, "half a radian"), by_name(found, "Fr is 3"), found.branches
     assert half.parameters["lambda_s"] == pytest.approx(0.5, abs=EXACT)
     assert half.parameters["Fr"] == pytest.approx(law(0.5), abs=EXACT)
@@ -54,7 +58,7 @@ def test_an_event_is_located_to_rounding_and_is_a_point_of_its_branch():
 
 
 def test_events_of_the_package_stay_as_they_are():
-    plain, more = tmsopt.trace(EP_SET, **FEW), tmsopt.trace(EP_SET, events=[HALF], **FEW)
+    plain, more = traced(), traced(HALF)
     named = [[(e.name, e.detail, dict(e.parameters)) for e in t.events if e.name != HALF.name] for t in (plain, more)]
     assert named[0] == named[1]
 
@@ -63,7 +67,7 @@ def test_a_function_may_use_quantities_and_unknowns_of_the_pattern():
     """On the EP set c = √12.5 throughout (c² = 1/(ζ_B ζ_H)), so b² − 4c is 0 at EP4, where the abscissa is −√c."""
     square = Event("square", lambda p: p["b"] ** 2 - 4 * p["c"])
     slow = Event("slow", lambda p: p["abscissa"] + 1)
-    found = tmsopt.trace(EP_SET, events=[square, slow], **FEW)
+    found = traced(square, slow)
     (ep4,) = by_name(found, "EP4")
     (same,) = by_name(found, "square")
     assert same.index == ep4.index  # one place, both names
@@ -74,12 +78,12 @@ def test_a_function_may_use_quantities_and_unknowns_of_the_pattern():
 def test_two_zeros_within_a_step_are_two_events():
     """lambda_s − 0.5 = ±1e-4, a fiftieth of a step."""
     near = Event("near", lambda p: (p["lambda_s"] - 0.5) ** 2 - 1e-8)
-    angles = [e.parameters["lambda_s"] for e in by_name(tmsopt.trace(EP_SET, events=[near], **FEW), "near")]
+    angles = [e.parameters["lambda_s"] for e in by_name(traced(near), "near")]
     assert sorted(angles) == pytest.approx([0.5 - 1e-4, 0.5 + 1e-4], abs=1e-10)
 
 
 def test_text_json_csv_and_pictures_have_them(tmp_path):
-    found = tmsopt.trace(EP_SET, events=[Event("slow", HALF.function, detail="on purpose")], **FEW)
+    found = traced(Event("slow", HALF.function, detail="on purpose"))
     assert "slow" in str(found)
     assert "on purpose" in str(found)
     data = json.loads(json.dumps(found.to_json()))
@@ -91,8 +95,8 @@ def test_text_json_csv_and_pictures_have_them(tmp_path):
 
 
 def test_an_event_that_stops_ends_a_branch_and_the_rest_is_another():
-    whole = tmsopt.trace(EP_SET, **FEW).branches[0]
-    found = tmsopt.trace(EP_SET, events=[Event("half", HALF.function, stop=True)], **FEW)
+    whole = traced().branches[0]
+    found = traced(Event("half", HALF.function, stop=True))
     assert len(found.branches) == 2
     assert sum(b.arclength[-1] for b in found.branches) == pytest.approx(whole.arclength[-1], abs=1e-4)
     for branch in found.branches:
@@ -131,7 +135,7 @@ def test_a_closed_curve_is_cut_where_it_stops(level):
 )
 def test_a_function_that_gives_no_number_is_named(function, words):
     with pytest.raises(InputError, match=words) as error:
-        tmsopt.trace(EP_SET, events=[Event("my own", function)], **FEW)
+        traced(Event("my own", function))
     (fault,) = error.value.faults
     assert fault.key == ("events", "my own")
     assert "Fr = " in fault.message  # where
@@ -158,7 +162,7 @@ def test_what_is_no_event_is_refused(events, words):
 
 def test_the_detail_of_an_event_decides_nothing():
     noted = Event("half", HALF.function, detail="stability changes")  # which weave and capsize say of theirs
-    (found,) = by_name(tmsopt.trace(EP_SET, events=[noted], **FEW), "half")
+    (found,) = by_name(traced(noted), "half")
     assert found.parameters["lambda_s"] == pytest.approx(0.5, abs=EXACT)
 
 
@@ -180,7 +184,7 @@ def test_points_lie_on_the_curve_and_their_tangents_along_it():
 
 
 def test_points_and_events_are_those_of_the_trace():
-    (branch,) = tmsopt.trace(EP_SET, events=[HALF], **FEW).branches
+    (branch,) = traced(HALF).branches
     curve = tmsopt.continue_from(EP_SET, events=[HALF])
     named = {name: p for p in curve for name in p.events}
     assert curve.end == "Fr.max"

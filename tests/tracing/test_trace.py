@@ -32,6 +32,9 @@ EP_SET = Path(__file__).parents[2] / "problems" / "ep_set.toml"
 SQRT2 = math.sqrt(2)
 TAN_EP4 = 15 / 4 - 75 * SQRT2 / 32  # Table 1
 FR_EP4 = 3 * math.sqrt(110 * SQRT2 - 120) / 8  # Table 1
+SPACE = {"Fr": (0.5, 4.0), "chi_B": (1.01, 3.0), "lambda_s": (0.01, 1.4)}
+TILTS = {"Fr": (0.01, 5.0), "lambda_s": (0.01, 1.4)}
+SECTION = {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)}
 NAMES = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
 
 EXACT = 1e-12
@@ -90,6 +93,12 @@ def mismatch(branch, k):
     return max(
         abs(float(p - a[0] * c)) / (size + sizes[0] * abs(float(c))) for p, c, size in zip(a, monic, sizes, strict=True)
     )
+
+
+def check_ep4(event):
+    """Table 1."""
+    p = event.parameters
+    assert (p["Fr"], p["chi_B"], math.tan(p["lambda_s"])) == pytest.approx((FR_EP4, SQRT2, TAN_EP4), abs=EXACT)
 
 
 def check_every_point(found, stride=1, limit=ROUNDING):
@@ -155,10 +164,7 @@ def test_ep_set_is_the_closed_form_at_over_1000_points(ep_set):
 def test_ep_set_has_its_ep4_and_its_fold_where_the_paper_and_calculus_put_them(ep_set):
     found, _ = ep_set
     (ep4,) = events(found, "EP4")
-    p = ep4.parameters
-    assert p["chi_B"] == pytest.approx(SQRT2, abs=EXACT)
-    assert math.tan(p["lambda_s"]) == pytest.approx(TAN_EP4, abs=EXACT)
-    assert p["Fr"] == pytest.approx(FR_EP4, abs=EXACT)
+    check_ep4(ep4)
     check_every_point(found, stride=7)
     (fold,) = (e for e in events(found, "fold") if "Fr" in e.detail)
     # Fr² = ρ² 4T²/(w⁴ζ_B + 4Tρ) is least at T = −w⁴ζ_B/(2ρ), where Fr² = −w⁴ζ_B: 12.5 · 0.4 = 5
@@ -243,11 +249,11 @@ def test_the_other_class_is_not_in_the_other_box():
 
 PLANES = {
     # plane → (fixed, free, number of EP3, whether the 2EP2 crossing is there)
-    "fig2 left": ({"chi_B": SQRT2 - 0.1}, {"Fr": (0.01, 5.0), "lambda_s": (0.01, 1.4)}, 1, False),
+    "fig2 left": ({"chi_B": SQRT2 - 0.1}, TILTS, 1, False),
     "fig2 right": ({"lambda_s": math.atan(TAN_EP4) - 0.18}, {"Fr": (0.01, 5.0), "chi_B": (0.5, 3.0)}, 2, True),
-    "fig00 at EP4": ({"Fr": FR_EP4}, {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)}, None, True),
-    "fig00 below": ({"Fr": FR_EP4 - 0.1}, {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)}, 2, False),
-    "fig00 above": ({"Fr": FR_EP4 + 0.5}, {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)}, 0, True),
+    "fig00 at EP4": ({"Fr": FR_EP4}, SECTION, None, True),
+    "fig00 below": ({"Fr": FR_EP4 - 0.1}, SECTION, 2, False),
+    "fig00 above": ({"Fr": FR_EP4 + 0.5}, SECTION, 0, True),
 }
 
 
@@ -307,14 +313,13 @@ def test_abscissa_at_a_crossing_does_not_scatter(planes, name):
 def test_the_section_through_ep4_has_it_as_an_event(planes):
     """EP3 and 2EP2 only touch 0 there; Table 1."""
     (event,) = events(planes["fig00 at EP4"], "EP4")
-    assert event.parameters["chi_B"] == pytest.approx(SQRT2, abs=EXACT)
-    assert math.tan(event.parameters["lambda_s"]) == pytest.approx(TAN_EP4, abs=EXACT)
+    check_ep4(event)
 
 
 @pytest.mark.parametrize("below", [1e-4, 1e-5, 1e-8, 1e-10])
 def test_sections_beside_ep4_keep_their_events_apart(below):
     """Below Fr_EP4 two EP3 and two 2EP2, each met by both of its roots, come together as the root of the distance."""
-    fixed, free = BASE | {"Fr": FR_EP4 - below}, {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)}
+    fixed, free = BASE | {"Fr": FR_EP4 - below}, SECTION
     found = traced("EP2", fixed, free)
     named = [(e.name, e.detail) for e in found.events if e.name in ("EP4", "EP3", "2EP2")]
     if below > 1e-6:
@@ -331,7 +336,7 @@ def test_sections_beside_ep4_keep_their_events_apart(below):
 @pytest.mark.slow
 def test_sections_above_ep4_have_no_ep3():
     for above in (1e-10, 1e-7, 1e-4):
-        found = traced("EP2", BASE | {"Fr": FR_EP4 + above}, {"chi_B": (0.5, 3.0), "lambda_s": (0.01, 1.4)})
+        found = traced("EP2", BASE | {"Fr": FR_EP4 + above}, SECTION)
         assert [e.name for e in found.events if e.name in ("EP4", "EP3", "2EP2")] == ["2EP2", "2EP2"]
 
 
@@ -350,23 +355,19 @@ def test_folds_of_the_discriminant_curves_in_speed_are_at_the_closed_form(planes
     """
     (fold,) = (e for e in events(planes["fig2 left"], "fold") if "Fr" in e.detail)
     assert fold.parameters["Fr"] == pytest.approx(math.sqrt(5), abs=EXACT)
-    on_law = traced("EP2", BASE | {"chi_B": SQRT2}, {"Fr": (0.01, 5.0), "lambda_s": (0.01, 1.4)})
+    on_law = traced("EP2", BASE | {"chi_B": SQRT2}, TILTS)
     assert events(on_law, "EP4")
     for event in events(on_law, "EP4"):  # where symmetry makes the traced equations singular
-        assert event.parameters["Fr"] == pytest.approx(FR_EP4, abs=EXACT)
-        assert math.tan(event.parameters["lambda_s"]) == pytest.approx(TAN_EP4, abs=EXACT)
+        check_ep4(event)
 
 
 def test_ep3_curve_through_space_is_a_cuspidal_edge_ending_in_ep4():
     """Codimension 2: Fr, chi_B, lambda_s free. Its EP4 is the paper's, and its sections are the cusps of the planes."""
-    free = {"Fr": (0.5, 4.0), "chi_B": (1.01, 3.0), "lambda_s": (0.01, 1.4)}
-    found = traced("EP3", BASE, free)
+    found = traced("EP3", BASE, SPACE)
     ep4 = events(found, "EP4")
     assert ep4
-    for e in ep4:
-        assert e.parameters["Fr"] == pytest.approx(FR_EP4, abs=EXACT)
-        assert e.parameters["chi_B"] == pytest.approx(SQRT2, abs=EXACT)
-        assert math.tan(e.parameters["lambda_s"]) == pytest.approx(TAN_EP4, abs=EXACT)
+    for event in ep4:
+        check_ep4(event)
     check_every_point(found, stride=17)
 
 
@@ -375,7 +376,7 @@ def test_ep3_curve_through_space_is_a_cuspidal_edge_ending_in_ep4():
 
 @pytest.mark.parametrize("chi_B", [1.2, SQRT2, 1.7])
 def test_weave_curve_is_the_critical_froude_number(chi_B):
-    found = traced("weave", BASE | {"chi_B": chi_B}, {"Fr": (0.01, 5.0), "lambda_s": (0.01, 1.4)})
+    found = traced("weave", BASE | {"chi_B": chi_B}, TILTS)
     (branch,) = found.branches
     Fr, angle = branch.parameters["Fr"], branch.parameters["lambda_s"]
     assert Fr**2 == pytest.approx(laws.Frc1(chi_B, -0.4, -0.2, angle), rel=1e-13)
@@ -485,9 +486,8 @@ def check_flags(branch, k):
 
 
 def test_inequalities_are_events_with_the_constraint_zero_and_flags_on_either_side():
-    free = {"Fr": (0.01, 5.0), "lambda_s": (0.01, 1.4)}
     constraints = {"trail": "nu_H >= 0.06", "fast": "Fr >= 1.5 * Fr_c", "tilt": "tan(lambda_s) + Fr <= 2.5"}
-    found = traced("EP2", BASE | {"chi_B": 1.3}, free, constraints)
+    found = traced("EP2", BASE | {"chi_B": 1.3}, TILTS, constraints)
 
     def values(p):
         with mp.workdps(curves.DIGITS):
@@ -519,8 +519,7 @@ def test_inequalities_are_events_with_the_constraint_zero_and_flags_on_either_si
 
 def test_root_quantities_may_constrain_a_traced_pattern():
     """abscissa ≤ −1 along the EP set: −b/2 + √(b²/4 − c) = −1 with c = √12.5, so b = 1 + √12.5, where 2EP2."""
-    free = {"Fr": (0.5, 4.0), "chi_B": (1.01, 3.0), "lambda_s": (0.01, 1.4)}
-    found = traced("2EP2", BASE, free, {"fast": "abscissa <= -1", "damped": "damping_ratio >= 0.8"})
+    found = traced("2EP2", BASE, SPACE, {"fast": "abscissa <= -1", "damped": "damping_ratio >= 0.8"})
     (branch,) = found.branches
     rows = {e.detail: [] for e in events(found, "constraint")}
     for e in events(found, "constraint"):
@@ -829,12 +828,3 @@ def test_an_ep4_is_met_once_and_in_its_place_beside_other_events(beside: float) 
     assert [event.name for event in branch.events].count("EP4") == 1
     assert tilts in (sorted(tilts), sorted(tilts, reverse=True))
     assert np.all(np.diff(branch.arclength) > 0)
-
-
-def test_ep2_curves_end_exactly_in_the_ep4_of_the_paper():
-    """Two EP2 meet at chi_B = √2, where the discriminant has a corner: an EP4 is found by its own equations."""
-    ep4 = [event for event in trace(EP_SET.with_name("chart.toml"), "EP2").events if event.name == "EP4"]
-    assert ep4
-    for event in ep4:
-        assert event.parameters["Fr"] == pytest.approx(FR_EP4, abs=EXACT)
-        assert math.tan(event.parameters["lambda_s"]) == pytest.approx(TAN_EP4, abs=EXACT)

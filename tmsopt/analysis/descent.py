@@ -1,7 +1,8 @@
-"""A better design near one that is not minimal, found along its feasible direction of descent.
+"""Finds a better design near a design that is not minimal, along a feasible direction of descent.
 
-A straight line in the parameters is not enough: near a root of multiplicity m it violates the factors by ε², which
-moves a root by ε^(2/m). Newton's method on the active rows keeps to the curve.
+A straight line in the parameters is not enough. Near a root of multiplicity m, a step ε along the line violates the
+equations of the factors by ε², which moves a root by ε^(2/m). Newton's method on the active rows follows the curve on
+which they hold.
 """
 
 from collections.abc import Iterator
@@ -17,11 +18,11 @@ from tmsopt.problem.solution import Solution
 from tmsopt.program.formulate import design_of
 from tmsopt.records import Array, Table
 
-_FIRST = 0.05  # longest step, relative to the sizes of the variables
-_RATIO = 4.0  # of successive steps
-_STEPS = 9  # the shortest step is 7e-7 of the sizes
-_ITERATIONS = 12  # of Newton's method
-_BETTER = 1e-9  # smallest improvement, relative to the objective, that rounding does not explain
+_LONGEST_STEP = 0.05  # longest step, relative to the sizes of the variables
+_STEP_RATIO = 4.0  # ratio of successive steps
+_STEPS = 9  # number of steps; the shortest is 7e-7 of the sizes
+_ITERATIONS = 12  # most iterations of Newton's method
+_MIN_IMPROVEMENT = 1e-9  # smallest improvement, relative to the objective, that rounding does not explain
 
 
 @dataclass(frozen=True)
@@ -37,30 +38,30 @@ class BetterDesign:
     order: int
 
 
-def find_better_design(program: LocalProgram, found: Conditions, solution: Solution) -> BetterDesign | None:
-    """The design after the longest step downhill that improves; None without one."""
-    problem, order = program.problem, 2 if curvature_sign(found.curvature) < 0 else 1
+def find_better_design(program: LocalProgram, conditions: Conditions, solution: Solution) -> BetterDesign | None:
+    """The design after the longest step downhill that improves the objective; None without such a step."""
+    problem, order = program.problem, 2 if curvature_sign(conditions.curvature) < 0 else 1
     reference = solution.abscissa if minimizes_abscissa(problem) else solution.value
-    for x in _downhill_points(program, found, both=order == 2):
+    for x in _downhill_points(program, conditions, both_sides=order == 2):
         at = dict(zip(program.variables, x.tolist(), strict=True))
-        moved = design_of(problem, [at.get(n, 0.0) for n in problem.free])
-        moved |= {n: solution.parameters[n] for n in problem.free if n not in at}
-        checked = recheck(problem, parameters := problem.ordered(moved))
-        # the stored doubles must be better too
+        design = design_of(problem, [at.get(n, 0.0) for n in problem.free])
+        design |= {n: solution.parameters[n] for n in problem.free if n not in at}
+        checked = recheck(problem, parameters := problem.ordered(design))
+        # the stored doubles must also be better
         value = max(checked.objective, checked.realised) if minimizes_abscissa(problem) else checked.objective
-        if not checked.violations and problem.sign * (reference - value) > _BETTER * (1 + abs(reference)):
+        if not checked.violations and problem.sign * (reference - value) > _MIN_IMPROVEMENT * (1 + abs(reference)):
             return BetterDesign(Table(parameters), value, order)
     return None
 
 
-def _downhill_points(program: LocalProgram, found: Conditions, both: bool) -> Iterator[Array]:
-    """Points along the direction of descent, the farthest first."""
+def _downhill_points(program: LocalProgram, conditions: Conditions, both_sides: bool) -> Iterator[Array]:
+    """Points along the direction of descent; the farthest point comes first."""
     jacobian = program.evaluate(program.x)[2]
     signed = np.array([row.signed for row in program.rows])
-    direction = found.downhill / np.abs(found.downhill / program.sizes).max()
+    direction = conditions.downhill / np.abs(conditions.downhill / program.sizes).max()
     for k in range(_STEPS):
-        for side in (1.0, -1.0) if both else (1.0,):
-            step = _FIRST / _RATIO**k * side * direction
+        for side in (1.0, -1.0) if both_sides else (1.0,):
+            step = _LONGEST_STEP / _STEP_RATIO**k * side * direction
             target = np.where(signed, np.maximum(jacobian @ step, 0.0), 0.0)
             x = _restore_rows(program, program.x + step, target)
             if x is not None:
@@ -68,7 +69,7 @@ def _downhill_points(program: LocalProgram, found: Conditions, both: bool) -> It
 
 
 def _restore_rows(program: LocalProgram, x: Array, target: Array) -> Array | None:
-    """The nearest point at which the active rows have the target values, by Newton's method; None where it fails."""
+    """The nearest point at which the active rows have the target values, by Newton's method; None if it fails."""
     start = x
     for _ in range(_ITERATIONS):
         _, h, jacobian, _ = program.evaluate(x)
@@ -78,5 +79,5 @@ def _restore_rows(program: LocalProgram, x: Array, target: Array) -> Array | Non
         x = x + step
         if np.abs(step / program.sizes).max() <= 1e-15:
             break
-    near = np.abs((x - start) / program.sizes).max() <= 2 * _FIRST
-    return x if near and np.all(np.isfinite(x)) else None
+    is_near = np.abs((x - start) / program.sizes).max() <= 2 * _LONGEST_STEP
+    return x if is_near and np.all(np.isfinite(x)) else None

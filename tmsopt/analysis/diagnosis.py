@@ -1,4 +1,4 @@
-"""Diagnosis of a multiple root: multiplicities, Jordan chains, and how it splits when a parameter changes."""
+"""Diagnoses a multiple root: its multiplicities, its Jordan chains, and how it splits when a parameter changes."""
 
 import math
 from collections.abc import Mapping
@@ -18,8 +18,8 @@ from tmsopt.roots import Root, Structure, backward_error
 from tmsopt.roots.jordan import Jordan, is_regular, jordan
 from tmsopt.search.solve import solve_if_needed
 
-_RANK = 1e-7  # relative singular value that counts as 0
-_TIMES = 10.0  # or this times √distance: near a semisimple root a singular value is the root of the distance
+_RANK = 1e-7  # largest relative singular value that counts as 0
+_DISTANCE_FACTOR = 10.0  # or this times √distance, because near a semisimple root singular values are about √distance
 
 
 @dataclass(frozen=True, repr=False)
@@ -30,12 +30,12 @@ class Diagnosis(Printable):
         re, im: the root.
         algebraic: algebraic multiplicity.
         geometric: number of independent eigenvectors; 1 for a polynomial without matrices.
-        partial: lengths of the Jordan chains, longest first; empty if the ranks contradict each other.
+        partial: lengths of the Jordan chains, longest first; empty if the computed ranks contradict each other.
         kind: ``defective`` for one chain, ``semisimple`` for chains of length 1, ``partly defective`` otherwise.
         jordan: the singular values behind the verdict; None without matrices.
         distance: relative change of the coefficients from the design to the nearest polynomial with the structure.
-        responses: one for each parameter, the most sensitive first.
-        eigenfrequency: ω = i s for a complex system, else None.
+        responses: one response for each parameter; the parameter that moves the root most comes first.
+        eigenfrequency: ω = i s for a complex system, otherwise None.
 
     Example:
         >>> (found,) = tmsopt.diagnose("problems/ep4.toml")
@@ -67,7 +67,7 @@ class Diagnosis(Printable):
             **plain(self, "distance", digits=6),
             "responses": [
                 {"parameter": r.parameter, "change": "relative" if r.relative else "absolute"}
-                | {"unmoved": r.unmoved, "unresolved": r.unresolved, "laws": [_law(law) for law in r.laws]}
+                | {"unmoved": r.unmoved, "unresolved": r.unresolved, "laws": [_law_to_json(law) for law in r.laws]}
                 for r in self.responses
             ],
         }
@@ -78,8 +78,8 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
 
     The structure of the solution gives the algebraic multiplicity. Ranks of the model's matrices, at the root of the
     nearest polynomial with that structure, give the geometric and partial multiplicities. The splitting follows from
-    the exact change of that polynomial with a parameter: s = s0 + (c ε)^(1/k) with c = −k! ∂p/∂θ / p⁽ᵏ⁾, or Newton's
-    polygon where c vanishes. Each law is confirmed by the roots themselves.
+    the exact change of that polynomial with a parameter: s = s0 + (c ε)^(1/k) with c = −k! ∂p/∂θ / p⁽ᵏ⁾, or, if c is 0,
+    from Newton's polygon. The computed roots confirm each law.
 
     Args:
         design: a solution, or a problem or its file, which is solved first.
@@ -97,12 +97,14 @@ def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagno
     problem = solution.problem.posed
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
     values, ideal = problem.values(parameters), solution.of_polynomial
-    found = values["structure"]
-    assert isinstance(found, Structure)
-    if found.name != ideal.name:  # the stored doubles are slightly off, so that they satisfy a limit
+    ideal_at_design = values["structure"]
+    assert isinstance(ideal_at_design, Structure)
+    if (
+        ideal_at_design.name != ideal.name
+    ):  # the stored doubles differ slightly from the ideal design, to satisfy a limit
         z = np.array([complex(r.re, r.im) for r in ideal.roots for _ in range(r.multiplicity)])
-        found = replace(ideal, distance=float(backward_error([float(c) for c in values.coefficients], z)))
-    return diagnose_roots(problem.model, problem.parameter_set, parameters, found, problem.free)
+        ideal_at_design = replace(ideal, distance=float(backward_error([float(c) for c in values.coefficients], z)))
+    return diagnose_roots(problem.model, problem.parameter_set, parameters, ideal_at_design, problem.free)
 
 
 def diagnose_roots(
@@ -115,16 +117,16 @@ def diagnose_roots(
     """Diagnose the multiple roots of a design whose roots have a known structure.
 
     Args:
-        free: ranges of free parameters; a value that is tiny compared with its range may stand for 0.
+        free: ranges of free parameters. A value that is tiny compared with its range may be a rounded 0.
     """
-    widths, found = {n: b - a for n, (a, b) in (free or {}).items()}, []
+    widths, diagnoses = {n: b - a for n, (a, b) in (free or {}).items()}, []
 
     def find_chains(point: RootPoint) -> Jordan | None:
-        """Jordan structure by the ranks of the matrices; None without matrices, or if they are singular for every s."""
+        """Jordan structure by ranks of the matrices; None without matrices, or if they are singular for every s."""
         if model.pencil is None:
             return None
         matrices = evaluate_pencil(model, parameter_set, point.values)
-        threshold = max(_RANK, _TIMES * math.sqrt(structure.distance))
+        threshold = max(_RANK, _DISTANCE_FACTOR * math.sqrt(structure.distance))
         if not is_regular(matrices, point.s, threshold):
             return None
         return jordan(matrices, point.s, point.multiplicity, threshold)
@@ -141,20 +143,20 @@ def diagnose_roots(
             verdict = exact if as_stored and exact and exact.geometric == as_stored.geometric else as_stored
             partial = verdict.partial if verdict else (k,)
             kind = "semisimple" if g == k else "defective" if g == 1 else "partly defective"
-            ordered = tuple(sorted((compute_response(point, name) for name in parameter_set.names), key=_sensitivity))
+            ordered = tuple(sorted((compute_response(point, name) for name in parameter_set.names), key=_rank_response))
             s = midpoint(point.s)
             omega = (complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, k)]))
             distance = structure.distance
-            found.append(Diagnosis(s.real, s.imag, k, g, partial, kind, verdict, distance, ordered, *omega))
-    return tuple(found)
+            diagnoses.append(Diagnosis(s.real, s.imag, k, g, partial, kind, verdict, distance, ordered, *omega))
+    return tuple(diagnoses)
 
 
-def _sensitivity(answer: Response) -> tuple[float, float]:
+def _rank_response(answer: Response) -> tuple[float, float]:
     first = answer.laws[0].branches if answer.laws else None
     return (float(first.exponent), -first.size) if first else (math.inf, 0.0)
 
 
-def _law(law: Law) -> dict[str, Any]:
+def _law_to_json(law: Law) -> dict[str, Any]:
     b = law.branches
     return {
         "roots": b.roots,

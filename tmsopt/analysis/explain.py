@@ -1,4 +1,4 @@
-"""Explanation of an optimum: its active limits and their value, its optimality, and the effect of rounding."""
+"""Explains an optimum: its active limits and their value, its optimality, and the effect of rounding."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -20,15 +20,15 @@ class Explanation(Tabular):
     """Explanation of a solution.
 
     Attributes:
-        summary: one sentence: the structure on the rightmost line, and how good the design is.
+        summary: one sentence about the structure of the rightmost roots and the quality of the design.
         structure, bound: as in the solution.
         optimality: whether the design is a local optimum, by the multipliers of its factors.
         levers: the active limits, the most valuable first; empty unless the design is optimal.
-        rounding: free parameter → the design with this parameter alone rounded to 3 digits.
+        rounding: free parameter → the design with only this parameter rounded, to 3 digits.
         precision: the design with all free parameters rounded to 2, 3, 4 and 6 digits.
         goal: the objective or the located pattern; empty without one.
         abscissa, value: abscissa of the design, and value of its objective.
-        warnings: arbitrary active bounds, bounds touched without a gain, parameters without effect.
+        warnings: arbitrary active bounds, bounds that are reached without a gain, parameters without effect.
 
     Example:
         >>> explained = tmsopt.explain("problems/ep4.toml", resolve=False)
@@ -52,7 +52,7 @@ class Explanation(Tabular):
 
     @property
     def worst(self) -> str:
-        """The parameter whose rounding loses most; empty if none loses anything."""
+        """The parameter whose rounding worsens the abscissa most; empty if rounding worsens nothing."""
         losses = {name: row.loss for name, row in self.rounding.items() if row.loss > 0}
         return max(losses, key=losses.__getitem__, default="")
 
@@ -62,15 +62,15 @@ class Explanation(Tabular):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        found = plain(self, "summary optimality levers rounding worst precision warnings")
-        return found | {"worst": self.worst or None}
+        data = plain(self, "summary optimality levers rounding worst precision warnings")
+        return data | {"worst": self.worst or None}
 
 
 def explain(design: Given, *, resolve: bool = True, progress: Listener | None = None) -> Explanation:
-    """Explain a solution; one that is not optimal gets fewer facts.
+    """Explain a solution. A solution that is not optimal gets fewer facts.
 
     Args:
-        resolve: check each multiplier by solving again, from the optimum, with its limit moved; some 30 ms each.
+        resolve: check each multiplier: move its limit and solve again from the optimum, which takes about 30 ms.
         progress: called with a `tmsopt.Progress` now and then.
 
     Example:
@@ -82,15 +82,17 @@ def explain(design: Given, *, resolve: bool = True, progress: Listener | None = 
     solution = solve_if_needed(design, progress)
     steps = start_steps(progress, "moving limits" if resolve else "weighing limits", "limit")
     problem = solution.problem.posed
-    alone, together = list_rounded_designs(solution) if not solution.violations else (Table[RoundedDesign](), ())
+    rounded_alone, rounded_together = (
+        list_rounded_designs(solution) if not solution.violations else (Table[RoundedDesign](), ())
+    )
     return Explanation(
         summary=summarise(solution),
         structure=solution.structure,
         bound=solution.bound,
         optimality=optimality(solution),
         levers=find_levers(solution, resolve, steps),
-        rounding=alone,
-        precision=together,
+        rounding=rounded_alone,
+        precision=rounded_together,
         warnings=list_warnings(solution),
         goal=problem.goal or (problem.locate or "").strip(),
         abscissa=solution.abscissa,

@@ -1,8 +1,9 @@
-"""Sentences about an infeasible problem: the limit in the way, the conflict, and the smallest change that helps."""
+"""Sentences about an infeasible problem: the limits that exclude a design, and the smallest change that helps."""
 
 import math
 from collections.abc import Collection
 
+from tmsopt.analysis.limits import split_bound
 from tmsopt.evaluation.exclusion import bound_without_search
 from tmsopt.models.expression import SIGN
 from tmsopt.problem import limit_value, unit_of
@@ -12,14 +13,20 @@ from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import dimension_of, limit_text
 from tmsopt.records import Table
 
-_AS_WRITTEN = 12  # digits of a present limit, shown next to a new one that may differ in the sixth
-_OTHER = {"a0": "a mass matrix that is not singular (a0 = 0)", "coefficients": "coefficients that have values"}
+_WRITTEN_DIGITS = 12  # digits of a present limit; the new limit next to it may differ in the sixth digit
+_OTHER_CONDITIONS = {
+    "a0": "a mass matrix that is not singular (a0 = 0)",
+    "coefficients": "coefficients that have values",
+}
 
 
 def infeasible_sentences(solution: Solution, full: bool = False) -> list[str]:
-    """The obstacle, the limits in conflict and the smallest change that helps; with `full` also each limit alone.
+    """The obstacle, the limits in conflict, and the smallest change that helps.
 
-    An unstable optimum gets one sentence, and any other solution none.
+    An unstable optimum gets one sentence. Any other feasible solution gets no sentence.
+
+    Args:
+        full: also list the change of each single limit that would be enough.
     """
     relaxation, problem, need = solution.relaxation, solution.problem.posed, solution.need
     lines = [text for text in [_describe_obstacle(solution)] if text]
@@ -32,7 +39,9 @@ def infeasible_sentences(solution: Solution, full: bool = False) -> list[str]:
         proved = relaxation.irreducible and _is_proved_infeasible(solution, names)
         words = "in conflict" if proved else "in conflict, not proved"
         lines.append(f"{words}: {', '.join(_describe_limit(problem, n) for n in names)}")
-    changes = [" and ".join(_describe_change(problem, *one) for one in found.items()) for found in relaxation.remedies]
+    changes = [
+        " and ".join(_describe_change(problem, *limit) for limit in remedy.items()) for remedy in relaxation.remedies
+    ]
     if not changes:
         return lines if need and need.found else [*lines, "of the changes of limits that were tried, none helps"]
     return [*lines, f"smallest change found: {changes[0]}", *(f"or alone: {text}" for text in changes[1:] if full)]
@@ -52,98 +61,102 @@ def _describe_obstacle(solution: Solution) -> str:
 
 
 def _describe_conflict(solution: Solution, relaxation: Relaxation) -> str:
-    """The range that the limits need, or else how near a design comes to them."""
+    """The range of a parameter that the limits need; without such a range, how near a design comes to the limits."""
     problem = solution.problem.posed
     names = [n for n in relaxation.conflict if not _is_range_end(problem, n)] or list(solution.violations)
-    remedies = (found for found in relaxation.remedies if all(_is_range_end(problem, n) for n in found))
+    remedies = (remedy for remedy in relaxation.remedies if all(_is_range_end(problem, n) for n in remedy))
     ends = next(remedies, Table[str]())
     limits = _join_words([_describe_limit(problem, n) for n in names])
     if ends:
-        needs = _join_words([_describe_requirement(problem, *one) for one in ends.items()])
-        others = " with the other limits" if problem.constraints.keys() - set(names) else ""
-        return f"{limits}{others} need{'s' if len(names) == 1 else ''} {needs}"
+        needs = _join_words([_describe_requirement(problem, *end) for end in ends.items()])
+        context = " with the other limits" if problem.constraints.keys() - set(names) else ""
+        return f"{limits}{context} need{'s' if len(names) == 1 else ''} {needs}"
     roots = f" with {problem.pattern.name}" if problem.pattern and problem.pattern.name not in names else ""
-    nearest = _describe_nearest(solution, names[0]) if len(names) == 1 else ""
+    nearest_text = _describe_nearest(solution, names[0]) if len(names) == 1 else ""
     if not _is_proved_infeasible(solution, names):
-        both = {1: "", 2: "both "}.get(len(names), "all of ")
-        return f"no design{roots} was found that meets {both}{limits}{nearest}"
+        count_word = {1: "", 2: "both "}.get(len(names), "all of ")
+        return f"no design{roots} was found that meets {count_word}{limits}{nearest_text}"
     verdict = f"cannot {'both' if len(names) == 2 else 'all'} be met" if len(names) > 1 else "is out of reach"
-    return f"{limits} {verdict}{roots}{nearest}"
+    return f"{limits} {verdict}{roots}{nearest_text}"
 
 
 def _is_proved_infeasible(solution: Solution, names: Collection[str]) -> bool:
-    """Whether a proof excludes these limits; one of all limits excludes some only where intervals confirm it."""
+    """Whether it is proved that no design satisfies these limits.
+
+    If these are not all limits of the problem, a proof for all limits is not enough, and intervals must confirm it.
+    """
     problem = solution.problem.posed
-    kept = {name: text for name, text in problem.constraints.items() if name in names}
-    has_all = kept.keys() == problem.constraints.keys()
-    return solution.bound.proven and (has_all or bound_without_search(problem.derive(constraints=kept)).proven)
+    constraints = {name: text for name, text in problem.constraints.items() if name in names}
+    has_all = constraints.keys() == problem.constraints.keys()
+    return solution.bound.proven and (has_all or bound_without_search(problem.derive(constraints=constraints)).proven)
 
 
 def _describe_required_speed(solution: Solution, need: RequiredValue) -> str:
-    """No design at this speed, and the nearest speed that has one."""
+    """A sentence that no design exists at this speed, with the nearest speed at which a design was found."""
     problem, name = solution.problem.posed, need.parameter
     unit = unit_of(problem, name)
-    about = [n for n in solution.violations if n in problem.asked_of_roots or n in problem.located]
-    unstable = _is_unstable(solution)
-    what = "no stable design"
-    if not unstable:
-        what = f"no design with {_join_words([_describe_limit(problem, n) for n in about])}"
+    limits = [n for n in solution.violations if n in problem.asked_of_roots or n in problem.located]
+    is_unstable = _is_unstable(solution)
+    subject = "no stable design"
+    if not is_unstable:
+        subject = f"no design with {_join_words([_describe_limit(problem, n) for n in limits])}"
     proved = solution.status == "infeasible" and solution.bound.proven
-    exists = "exists" if proved or (unstable and solution.any_stable is False) else "was found"
+    exists = "exists" if proved or (is_unstable and solution.any_stable is False) else "was found"
     low, high = problem.free.get(name, (problem.fixed.get(name, math.nan),) * 2)
     at = f"at {name} = {unit.show(low)}" if low == high else f"for {name} from {unit.number(low)} to {unit.show(high)}"
     if not need.found:
         low, high = need.looked
-        return f"{what} {exists} {at}; none was found for {name} from {unit.number(low)} to {unit.show(high)} either"
-    lowest, shown = "highest" if need.most else "lowest", unit.show(need.shown)
-    return f"{what} {exists} {at}: the {lowest} {name} found is {shown}"
+        return f"{subject} {exists} {at}; none was found for {name} from {unit.number(low)} to {unit.show(high)} either"
+    extreme, value = "highest" if need.most else "lowest", unit.show(need.shown)
+    return f"{subject} {exists} {at}: the {extreme} {name} found is {value}"
 
 
 def _is_unstable(solution: Solution) -> bool:
     return solution.stable is False and solution.any_stable is not True
 
 
-def _describe_requirement(problem: Posed, bound: str, new: str) -> str:
+def _describe_requirement(problem: Posed, bound: str, required: str) -> str:
     """The value that a parameter needs, and the end of its range that does not allow it."""
-    name, end = bound.rsplit(".", 1)
-    word, other = ("at least", "at most") if end == "max" else ("at most", "at least")
-    allowed = unit_of(problem, bound).show(problem.free[name][end == "max"], _AS_WRITTEN)
-    return f"{name} {word} {new} ({other} {allowed} is allowed)"
+    name, is_upper, value = split_bound(problem, bound)
+    word, opposite = ("at least", "at most") if is_upper else ("at most", "at least")
+    allowed = unit_of(problem, bound).show(value, _WRITTEN_DIGITS)
+    return f"{name} {word} {required} ({opposite} {allowed} is allowed)"
 
 
 def _describe_nearest(solution: Solution, name: str) -> str:
-    """How near a design comes to a limit: the value of the side that is not a number."""
+    """How near a design comes to a limit: the value of the side of the limit that is not a number."""
     problem, relaxation = solution.problem.posed, solution.relaxation
     condition = problem.conditions.get(name)
     if relaxation is None or condition is None:
         return ""
     sides = SIGN.split(problem.constraints[name])
-    reached = condition.sides(problem.values(relaxation.parameters))
+    side_values = condition.sides(problem.values(relaxation.parameters))
     amount = relaxation.amounts.get(name, 0.0)
-    for side, other, own, sign in zip(sides, reversed(sides), reached, (1, -1), strict=True):
-        if (limit := _parse_number(other)) is not None:
+    for side, opposite, side_value, sign in zip(sides, reversed(sides), side_values, (1, -1), strict=True):
+        if (limit := _parse_number(opposite)) is not None:
             varied = problem.nominal is not problem
-            # A design has no robustness radius of its own, and the worst of several cases counts.
-            value = own if math.isfinite(own) and not varied else limit + sign * condition.sign * amount
+            # the values of one design do not include the robustness radius or the worst of several cases
+            value = side_value if math.isfinite(side_value) and not varied else limit + sign * condition.sign * amount
             if not math.isfinite(value) or not math.isfinite(amount):
                 return f": {side.strip()} has no value where the search ended"
-            shown = f"{side.strip()} = {unit_of(problem, name).show(value)}"
-            return f": the nearest design found has {shown}{' in its worst case' if varied else ''}"
+            text = f"{side.strip()} = {unit_of(problem, name).show(value)}"
+            return f": the nearest design found has {text}{' in its worst case' if varied else ''}"
     return ""
 
 
-def _describe_change(problem: Posed, name: str, new: str) -> str:
-    """The limit to write, and its present number."""
+def _describe_change(problem: Posed, name: str, new_limit: str) -> str:
+    """The new limit that the user should write, and the present number."""
     if _is_range_end(problem, name):
-        parameter, end = name.rsplit(".", 1)
-        old = unit_of(problem, name).number(problem.free[parameter][end == "max"], _AS_WRITTEN)
-        return f"{parameter} {'up' if end == 'max' else 'down'} to {new} instead of {old}"
+        parameter, is_upper, value = split_bound(problem, name)
+        old = unit_of(problem, name).number(value, _WRITTEN_DIGITS)
+        return f"{parameter} {'up' if is_upper else 'down'} to {new_limit} instead of {old}"
     limit = limit_value(problem.constraints[name])
-    return f"{new}{'' if limit is None else f' instead of {limit:.{_AS_WRITTEN}g}'} ({_name_with_unit(problem, name)})"
+    old = "" if limit is None else f" instead of {limit:.{_WRITTEN_DIGITS}g}"
+    return f"{new_limit}{old} ({_name_with_unit(problem, name)})"
 
 
 def _name_with_unit(problem: Posed, name: str) -> str:
-    """The name of a constraint with the unit of its numbers, which is its own, not one chosen for parameters."""
+    """The name of a constraint with the unit of its numbers, which is not the unit that the user chose for display."""
     unit = dimension_of(problem, name).unit
     return name if unit == "1" else f"{name}, in {unit}"
 
@@ -151,10 +164,9 @@ def _name_with_unit(problem: Posed, name: str) -> str:
 def _describe_limit(problem: Posed, name: str) -> str:
     """A constraint with its text, or an end of a range as an inequality."""
     if _is_range_end(problem, name):
-        parameter, end = name.rsplit(".", 1)
-        bound = unit_of(problem, name).show(problem.free[parameter][end == "max"])
-        return f"{parameter} {'<=' if end == 'max' else '>='} {bound}"
-    return f"{name} ({limit_text(problem, name)})" if name in problem.constraints else _OTHER.get(name, name)
+        parameter, is_upper, value = split_bound(problem, name)
+        return f"{parameter} {'<=' if is_upper else '>='} {unit_of(problem, name).show(value)}"
+    return f"{name} ({limit_text(problem, name)})" if name in problem.constraints else _OTHER_CONDITIONS.get(name, name)
 
 
 def _is_range_end(problem: Posed, name: str) -> bool:

@@ -1,4 +1,4 @@
-"""The value of each active limit: its multiplier, checked by solving again with the limit moved."""
+"""Computes the value of each active limit: its multiplier, which is checked by moving the limit and solving again."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -21,10 +21,10 @@ from tmsopt.records import plain
 from tmsopt.search.solve import solve_any_status
 
 DIFFERS = 0.2
-"""Relative difference between predicted and resolved gain above which the reason is reported."""
+"""Relative difference between predicted and resolved gain above which the report gives a reason."""
 
-_RETRY = 8  # starts of the second search, if the first from the optimum alone gives another gain
-_NOISE = 1e-8  # difference, relative to the objective, that is not significant
+_RETRY_STARTS = 8  # starts of the second search, if the first search, from the optimum only, gives a different gain
+_NOISE = 1e-8  # largest difference, relative to the objective, that is not significant
 
 
 @dataclass(frozen=True)
@@ -32,16 +32,16 @@ class Lever:
     """An active limit and the gain from moving it. A gain is positive where the objective improves.
 
     Attributes:
-        name: of the constraint, or a bound such as ``Fr.max``.
+        name: name of the constraint, or a bound such as ``Fr.max``.
         kind: ``bound`` or ``constraint``.
         limit: the limit, in the unit in which the problem is written.
         physical: whether the limit is a physical end, such as 0 for a mass, and cannot be moved.
         move: the change of the limit in words, e.g. ``raising lambda_s.max by 1 deg``.
-        step: signed change of the limit in the unit of the parameter; 0 where it cannot be moved.
-        per_unit: gain per unit of that change, to first order (the multiplier).
-        resolved: gain found by solving the problem with the limit moved; nan where that was not done or failed.
-        structure: of the new optimum; empty without one.
-        reason: why the two gains differ, or why there is only one.
+        step: signed change of the limit in the unit of the parameter; 0 if the limit cannot be moved.
+        per_unit: gain per unit of this change, to first order (the multiplier).
+        resolved: gain after solving the problem with the moved limit; nan if this was not done or failed.
+        structure: structure of the new optimum; empty without a new optimum.
+        reason: why the two gains differ, or why there is only one gain.
         gained: unit of the gains.
     """
 
@@ -64,7 +64,7 @@ class Lever:
 
     @property
     def relative(self) -> float:
-        """Resolved minus first-order gain, relative to the latter."""
+        """Resolved gain minus first-order gain, relative to the first-order gain."""
         return (self.resolved - self.predicted) / self.predicted if self.predicted else math.nan
 
     @property
@@ -95,23 +95,29 @@ class Lever:
 
 
 def find_levers(solution: Solution, resolve: bool = True, progress: Counts | None = None) -> tuple[Lever, ...]:
-    """One lever for each active limit of an optimum, the most valuable step first."""
+    """One lever for each active limit of an optimum; the most valuable lever comes first."""
     if solution.status != "optimal":
         return ()
-    found = [_first_order_lever(solution, name) for name in solution.active]
-    sample = resolve and (len(found) == 1 or _has_remote_optimum(solution, found))
-    for k, lever in enumerate(found):
-        found[k] = _resolve_lever(solution, lever, sample) if resolve and lever.step else lever
+    levers = [_first_order_lever(solution, name) for name in solution.active]
+    sample = resolve and (len(levers) == 1 or _has_remote_optimum(solution, levers))
+    for k, lever in enumerate(levers):
+        levers[k] = _resolve_lever(solution, lever, sample) if resolve and lever.step else lever
         if progress:
-            progress(k + 1, len(found))
-    return tuple(sorted(found, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
+            progress(k + 1, len(levers))
+    return tuple(sorted(levers, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
+
+
+def split_bound(problem: Posed, bound: str) -> tuple[str, bool, float]:
+    """The parameter of a bound such as ``mu.min``, whether it is the upper bound, and its value."""
+    name, end = bound.rsplit(".", 1)
+    return name, end == "max", problem.free[name][end == "max"]
 
 
 def is_physical(problem: Posed, bound: str) -> bool:
     """Whether a bound such as ``mu.min`` is a physical end of its parameter's range."""
-    name, end = bound.rsplit(".", 1)
-    allowed = problem.parameter_set[name].range
-    return problem.free[name][end == "max"] == (allowed.upper if end == "max" else allowed.lower)
+    name, is_upper, value = split_bound(problem, bound)
+    physical_range = problem.parameter_set[name].range
+    return value == (physical_range.upper if is_upper else physical_range.lower)
 
 
 def move_limit(problem: Posed, name: str, step: float) -> Posed:
@@ -119,7 +125,7 @@ def move_limit(problem: Posed, name: str, step: float) -> Posed:
     if name in problem.constraints:
         text = problem.constraints[name]
         limit = split_limit(text)
-        if limit and not limit.behind:  # the number on the right
+        if limit and not limit.behind:  # the number is the right-hand side
             text = limit.replace_number(repr(limit.value + step))
         else:
             left, sign, right = written_sides(text)
@@ -136,40 +142,42 @@ def _first_order_lever(solution: Solution, name: str) -> Lever:
     problem = solution.problem.posed
     gained, multiplier = common_unit(problem, problem.goal) if problem.goal else Unit(), solution.active[name]
     if name in problem.constraints:
-        condition, shown = problem.conditions[name], limit_text(problem, name)
+        condition, limit_shown = problem.conditions[name], limit_text(problem, name)
         sides = [abs(float(side)) for side in condition.sides(problem.values(solution.parameters))]
         size = max(filter(math.isfinite, sides), default=1.0)  # equal within rounding
         natural = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, size)
-        sign, words = condition.sign, f"relaxing {name} ({shown}) by {natural.text}"
+        sign, words = condition.sign, f"relaxing {name} ({limit_shown}) by {natural.text}"
         if condition.equality:  # the right-hand side moves in the direction that improves the objective
             sign = math.copysign(1.0, -problem.sign * multiplier)
-            words = f"moving {name} ({shown}) by {'' if sign > 0 else '-'}{natural.text}"
-        return Lever(name, "constraint", shown, False, words, sign * natural.size, abs(multiplier), gained=gained)
-    parameter, end = problem.parameter_set[name.rsplit(".", 1)[0]], name.endswith(".max")
-    limit, width = problem.free[parameter.name][end], float(np.ptp(problem.free[parameter.name]))
-    # the size of an angle is the width of its range, because 0 is a tilt like any other
+            words = f"moving {name} ({limit_shown}) by {'' if sign > 0 else '-'}{natural.text}"
+        return Lever(name, "constraint", limit_shown, False, words, sign * natural.size, abs(multiplier), gained=gained)
+    parameter_name, is_upper, limit = split_bound(problem, name)
+    parameter, width = problem.parameter_set[parameter_name], float(np.ptp(problem.free[parameter_name]))
+    # the size of an angle is the width of its range, because a tilt of 0 is not special
     size = width if parameter.unit == "rad" or not limit else min(abs(limit), width)
-    unit, direction = unit_of(problem, parameter.name), 1.0 if end else -1.0
+    unit, direction = unit_of(problem, parameter_name), 1.0 if is_upper else -1.0
     step = step_within(unit, parameter.unit, size, limit, direction, parameter.range)
-    words = f"{'raising' if end else 'lowering'} {name} by {step.text}" if step else ""
-    change, shown = direction * step.size if step else 0.0, unit.show(limit, 10)
-    return Lever(name, "bound", shown, is_physical(problem, name), words, change, abs(multiplier), gained=gained)
+    words = f"{'raising' if is_upper else 'lowering'} {name} by {step.text}" if step else ""
+    change, limit_shown = direction * step.size if step else 0.0, unit.show(limit, 10)
+    return Lever(name, "bound", limit_shown, is_physical(problem, name), words, change, abs(multiplier), gained=gained)
 
 
 def _solve_moved(solution: Solution, problem: Posed, starts: int, sample: bool) -> Solution:
-    """Solve a problem with moved limits from the optimum; `sample`: search the whole box too."""
+    """Solve a problem with moved limits, starting at the optimum; with `sample`, also search the whole box."""
     options = replace(DEFAULTS, starts=starts, near={n: solution.parameters[n] for n in problem.free})
     return solve_any_status(problem, options, without_sample=not sample, bound=False)
 
 
-def _has_remote_optimum(solution: Solution, found: Sequence[Lever]) -> bool:
-    """Whether moving all limits at once makes a design elsewhere better than the one that the optimum leads to."""
+def _has_remote_optimum(solution: Solution, levers: Sequence[Lever]) -> bool:
+    """Whether, with all limits moved, a design elsewhere is better than the optimum near the present one."""
     problem = solution.problem.posed
-    for lever in found:
+    for lever in levers:
         with suppress(InputError):
             problem = move_limit(problem, lever.name, lever.step)
-    near, whole = (_solve_moved(solution, problem, 1, sample) for sample in (False, True))
-    return near.status != "optimal" or problem.sign * (near.value - whole.value) > _NOISE * (1 + abs(solution.value))
+    near_solution, box_solution = (_solve_moved(solution, problem, 1, sample) for sample in (False, True))
+    return near_solution.status != "optimal" or problem.sign * (near_solution.value - box_solution.value) > _NOISE * (
+        1 + abs(solution.value)
+    )
 
 
 def _resolve_lever(solution: Solution, lever: Lever, sample: bool) -> Lever:
@@ -178,29 +186,31 @@ def _resolve_lever(solution: Solution, lever: Lever, sample: bool) -> Lever:
         problem = move_limit(solution.problem.posed, lever.name, lever.step)
     except InputError:
         return replace(lever, reason="the problem with this limit moved is not valid")
-    best = None
-    for starts in (1, _RETRY):
-        found = _solve_moved(solution, problem, starts, sample or starts > 1)
-        if found.status == "optimal" and not (best and problem.sign * (found.value - best.value) >= 0):
-            best = found
-            gain = -problem.sign * (best.value - solution.value)
-            lever = replace(lever, resolved=gain, structure=best.structure)
+    best_solution = None
+    for starts in (1, _RETRY_STARTS):
+        new_solution = _solve_moved(solution, problem, starts, sample or starts > 1)
+        if new_solution.status == "optimal" and not (
+            best_solution and problem.sign * (new_solution.value - best_solution.value) >= 0
+        ):
+            best_solution = new_solution
+            gain = -problem.sign * (best_solution.value - solution.value)
+            lever = replace(lever, resolved=gain, structure=best_solution.structure)
             if abs(lever.relative) <= DIFFERS:
                 return lever
-    if best is None:
-        return replace(lever, reason=f"the problem with this limit moved is {found.status.replace('_', ' ')}")
-    return replace(lever, reason=", ".join(_explain_difference(solution, best)))
+    if best_solution is None:
+        return replace(lever, reason=f"the problem with this limit moved is {new_solution.status.replace('_', ' ')}")
+    return replace(lever, reason=", ".join(_explain_difference(solution, best_solution)))
 
 
-def _explain_difference(solution: Solution, found: Solution) -> Iterator[str]:
+def _explain_difference(solution: Solution, new_solution: Solution) -> Iterator[str]:
     """Reasons why the gain differs from the prediction of the multiplier."""
-    if found.structure != solution.structure:
-        yield f"the structure changes from {solution.structure} to {found.structure}"
-    for words, names, others in (
-        ("no longer active", solution.active, found.active),
-        ("newly active", found.active, solution.active),
+    if new_solution.structure != solution.structure:
+        yield f"the structure changes from {solution.structure} to {new_solution.structure}"
+    for words, names, other_names in (
+        ("no longer active", solution.active, new_solution.active),
+        ("newly active", new_solution.active, solution.active),
     ):
-        if changed := [n for n in names if n not in others]:
+        if changed := [n for n in names if n not in other_names]:
             yield f"{words}: {' and '.join(changed)}"
-    if found.structure == solution.structure and set(found.active) == set(solution.active):
-        yield f"the gain is not linear over this step ({found.structure} before and after)"
+    if new_solution.structure == solution.structure and set(new_solution.active) == set(solution.active):
+        yield f"the gain is not linear over this step ({new_solution.structure} before and after)"

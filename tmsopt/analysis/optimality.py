@@ -1,4 +1,4 @@
-"""Local optimality of a design by the multipliers of its factors and limits.
+"""Judges the local optimality of a design by the multipliers of its factors and limits.
 
 The program minimises γ subject to p(t + γ; θ) = a0(θ) ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, and to the limits on θ. The
 factors of the roots on the rightmost line are at their bounds (see `tmsopt.analysis.program`). The conditions are
@@ -9,8 +9,9 @@ factors of the roots on the rightmost line are at their bounds (see `tmsopt.anal
     second order    otherwise the Hessian of f − y·h must be positive on the null space of these rows.
 
 In p(t + γ) only c₁ depends on γ to first order, with the factor m, the multiplicity of the root. The multipliers of the
-c₁ therefore satisfy Σ m y = 1 for the abscissa. Burke and Overton (2001) find the same −1/m for its subgradients, with
-a weight ≥ 0 for Re c₂ and free weights for the others. For given a4/a0, an EP4 at −ω has yₖ = 1/(4 ωᵏ⁻¹).
+c₁ therefore satisfy Σ m y = 1 for the abscissa. Burke and Overton (2001) find the same −1/m for the subgradients of the
+abscissa, with a weight ≥ 0 for Re c₂ and free weights for the other coefficients. If a4/a0 is given, an EP4 at −ω has
+yₖ = 1/(4 ωᵏ⁻¹).
 """
 
 import math
@@ -38,20 +39,20 @@ from tmsopt.search.solve import solve_if_needed
 STRICT, NOT_MINIMAL, UNDECIDED, NOT_COVERED = "strict minimum", "not minimal", "undecided", "not covered"
 
 _TOLERANCE = 1e-7
-"""Largest value of an active row, relative to its size; a constraint counts as satisfied within 1e-9 of its sides."""
+"""Largest value of an active row, relative to its size. Constraints count as satisfied to 1e-9 of their sides."""
 
 
 @dataclass(frozen=True)
 class RightmostRoot:
-    """A root on the rightmost line, or the upper one of a complex pair, with the multipliers of its factors.
+    """A root on the rightmost line, or the upper root of a complex pair, with the multipliers of its factors.
 
     Attributes:
-        share: its share of the abscissa; the shares of all roots on the line add up to 1.
-        beta: increase of the objective per unit of a βᵢ, which moves roots left of the line.
-        kappa: increase per unit of the coefficient that splits a multiple root along the line: κᵢ of a real root,
-            (κ₁ − κ₂)²/(16 ω²) of a complex one; nan for a simple root.
-        ties: increase per unit of each further coefficient; these stay 0, so either sign is possible.
-        eigenfrequency: ω = i s for a complex system, else None.
+        share: share of the root in the abscissa; the shares of all roots on the line add up to 1.
+        beta: increase of the objective per unit of a βᵢ, which moves roots to the left of the line.
+        kappa: increase per unit of the coefficient that splits a multiple root along the line: κᵢ for a real root,
+            (κ₁ − κ₂)²/(16 ω²) for a complex root; nan for a simple root.
+        ties: increase per unit of each further coefficient. These coefficients stay 0, so both signs are possible.
+        eigenfrequency: ω = i s for a complex system, otherwise None.
     """
 
     re: float
@@ -65,8 +66,8 @@ class RightmostRoot:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        found = plain(self, "re im multiplicity share beta kappa ties")
-        return found | (plain(self, "eigenfrequency") if self.eigenfrequency is not None else {})
+        data = plain(self, "re im multiplicity share beta kappa ties")
+        return data | (plain(self, "eigenfrequency") if self.eigenfrequency is not None else {})
 
 
 @dataclass(frozen=True, repr=False)
@@ -74,20 +75,20 @@ class Optimality(Printable):
     """Local optimality of a design.
 
     Attributes:
-        verdict: ``strict minimum`` (maximum of a maximised objective), ``not minimal``, ``undecided`` or
+        verdict: ``strict minimum`` (for a maximised objective, a strict maximum), ``not minimal``, ``undecided`` or
             ``not covered``.
         reason: the verdict in a sentence.
         order: order of the derivatives that decide, 1 or 2; 0 if undecided.
         goal: the objective, such as ``abscissa``.
         roots: roots on the rightmost line, with the multipliers of their factors; empty if not stationary.
         limits: constraint or bound → gain per unit of relaxation, as in ``Solution.active``; empty if not stationary.
-        unknowns: number of free parameters with an effect, plus one for the abscissa.
+        unknowns: number of free parameters with an effect, plus 1 for the abscissa.
         conditions: number of active coefficients of factors and active limits.
         residual: share of the gradient that the multipliers do not explain.
-        curvature: least curvature in the null space of the conditions, relative to the largest; nan at a vertex.
+        curvature: smallest curvature in the null space of the conditions, relative to the largest; nan at a vertex.
         idle: free parameters without an effect.
         better: a better design nearby, rechecked, if the verdict is ``not minimal``.
-        better_value: its objective.
+        better_value: objective of the better design.
 
     Example:
         >>> judged = tmsopt.optimality("problems/ep4.toml")
@@ -115,14 +116,14 @@ class Optimality(Printable):
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
         if self.verdict == NOT_COVERED:
             return plain(self, "verdict reason")
-        found = plain(self)
-        return found if self.better else {n: x for n, x in found.items() if n not in ("better", "better_value")}
+        data = plain(self)
+        return data if self.better else {n: x for n, x in data.items() if n not in ("better", "better_value")}
 
 
 def optimality(design: Given, *, progress: Listener | None = None) -> Optimality:
-    """Judge a design by the first-order and, where needed, second-order conditions on its factors.
+    """Judge a design by the first-order and, if needed, second-order conditions on its factors.
 
-    For a pattern that was located without an objective, the abscissa is judged within the ranges and constraints.
+    If a pattern was located without an objective, the abscissa is judged, within the ranges and constraints.
 
     Args:
         design: a solution, or a problem or its file, which is solved first.
@@ -137,40 +138,40 @@ def optimality(design: Given, *, progress: Listener | None = None) -> Optimality
     solution = solve_if_needed(design, progress)
     start_steps(progress, "judging the optimum")
     try:
-        problem = _problem_to_judge(solution)
+        problem = _choose_problem(solution)
         program = build_program(problem, solution)
     except NotCovered as error:
         return Optimality(NOT_COVERED, str(error))
-    found = evaluate_conditions(program)
-    weight = sum(y for y, h in zip(found.scaled, program.rows, strict=True) if h.name == "c1")
-    if not found.downhill.any() and not weight > POSITIVE:
+    conditions = evaluate_conditions(program)
+    weight = sum(y for y, h in zip(conditions.scaled, program.rows, strict=True) if h.name == "c1")
+    if not conditions.downhill.any() and not weight > POSITIVE:
         return Optimality(NOT_COVERED, "the objective does not decrease with the abscissa")
-    better = find_better_design(program, found, solution) if found.downhill.any() else None
-    verdict, order, reason = _verdict(solution, program, found, better)
-    stationary = found.residual <= STATIONARY
+    better = find_better_design(program, conditions, solution) if conditions.downhill.any() else None
+    verdict, order, reason = _judge(solution, program, conditions, better)
+    stationary = conditions.residual <= STATIONARY
     unknowns, count = _count_unknowns(program)
     return Optimality(
         verdict=verdict,
         reason=reason,
         order=order,
         goal=problem.goal,
-        roots=_rightmost_roots(program, found) if stationary else (),
-        limits=Table(_limit_gains(solution, program, found) if stationary else {}),
+        roots=_list_rightmost_roots(program, conditions) if stationary else (),
+        limits=Table(_compute_limit_gains(solution, program, conditions) if stationary else {}),
         unknowns=unknowns,
         conditions=count,
-        residual=found.residual,
-        curvature=found.curvature,
+        residual=conditions.residual,
+        curvature=conditions.curvature,
         idle=program.idle,
         better=better.parameters if better else Table(),
         better_value=better.value if better else math.nan,
     )
 
 
-def _problem_to_judge(solution: Solution) -> Posed:
+def _choose_problem(solution: Solution) -> Posed:
     """The problem of which the design may be an optimum.
 
     Raises:
-        NotCovered: if there is none, with the reason.
+        NotCovered: if there is no such problem; the text is the reason.
     """
     problem = solution.problem.posed
     if not problem.free:
@@ -203,65 +204,69 @@ def _problem_to_judge(solution: Solution) -> Posed:
     return problem
 
 
-def _verdict(
-    solution: Solution, program: LocalProgram, found: Conditions, better: BetterDesign | None
+def _judge(
+    solution: Solution, program: LocalProgram, conditions: Conditions, better: BetterDesign | None
 ) -> tuple[str, int, str]:
-    """Verdict, order of the derivatives that decide it, and the sentence."""
+    """The verdict, the order of the derivatives that decide it, and the verdict in a sentence."""
     problem, name = program.problem, f"this {solution.structure} is"
     extreme = f"local {'maximum' if problem.sense == 'maximize' else 'minimum'} of {problem.goal}"
     extreme += ", though this was not asked for" if solution.problem.locate else ""
     if better is not None:
-        reason = f"{_describe_descent(program, found)}; {_describe_better_design(solution, better)}"
+        reason = f"{_describe_descent(program, conditions)}; {_describe_better_design(solution, better)}"
         return NOT_MINIMAL, better.order, f"{name} no {extreme}: {reason}"
-    if doubt := _find_doubt(program, found):
+    if doubt := _find_doubt(program, conditions):
         return UNDECIDED, 0, f"undecided whether {name} a {extreme}: {doubt}"
     unknowns, count = _count_unknowns(program)
     active = f"{count} active condition{'s leave' if count != 1 else ' leaves'}"
     idle = f"; without effect: {', '.join(program.idle)}" if program.idle else ""
-    if np.isnan(found.curvature):
+    if np.isnan(conditions.curvature):
         return STRICT, 1, f"{name} a strict {extreme}: {active} none of the {unknowns} unknowns free{idle}"
     bend = "downwards" if solution.problem.posed.sense == "maximize" else "upwards"
     free = f"{active} some of the {unknowns} unknowns free"
     return STRICT, 2, f"{name} a strict {extreme}: {free}, and the objective curves {bend} in the free directions{idle}"
 
 
-def _find_doubt(program: LocalProgram, found: Conditions) -> str:
-    """Why the conditions do not decide although no better design was found; empty where they decide."""
-    if found.residual > STATIONARY or (found.downhill.any() and np.isnan(found.curvature)):
-        return f"{_describe_residual(found)}, but no better design was found downhill"
-    left, sizes = np.abs(program.evaluate(program.x)[1]), np.array([h.size for h in program.rows])
-    off = float(np.divide(left, sizes, out=np.zeros_like(left), where=sizes > 0).max(initial=0.0))
-    if off > _TOLERANCE:
-        return f"the active conditions hold only to {off:.1g}"
-    loose = [h for h, firm in zip(program.rows, found.firm, strict=True) if h.name == "c2" and not firm]
-    if any(program.line[h.cluster].multiplicity > 3 for h in loose):
+def _find_doubt(program: LocalProgram, conditions: Conditions) -> str:
+    """Why the conditions do not decide, although no better design was found; empty if they decide."""
+    if conditions.residual > STATIONARY or (conditions.downhill.any() and np.isnan(conditions.curvature)):
+        return f"{_describe_residual(conditions)}, but no better design was found downhill"
+    deviations, sizes = np.abs(program.evaluate(program.x)[1]), np.array([h.size for h in program.rows])
+    worst_deviation = float(
+        np.divide(deviations, sizes, out=np.zeros_like(deviations), where=sizes > 0).max(initial=0.0)
+    )
+    if worst_deviation > _TOLERANCE:
+        return f"the active conditions hold only to {worst_deviation:.1g}"
+    loose_rows = [h for h, firm in zip(program.rows, conditions.firm, strict=True) if h.name == "c2" and not firm]
+    if any(program.line[h.cluster].multiplicity > 3 for h in loose_rows):
         return "no first-order condition keeps a multiple root together"  # c₄ ≤ c₂² may then outweigh c₂
-    if curvature_sign(found.curvature) <= 0 and not np.isnan(found.curvature):
-        change = "improves" if curvature_sign(found.curvature) else "is flat"
+    if curvature_sign(conditions.curvature) <= 0 and not np.isnan(conditions.curvature):
+        change = "improves" if curvature_sign(conditions.curvature) else "is flat"
         return f"along the free directions the objective {change} to second order"
     return ""
 
 
-def _describe_residual(found: Conditions) -> str:
-    return f"the active conditions do not balance {found.residual:.1g} of the gradient"
+def _describe_residual(conditions: Conditions) -> str:
+    return f"the active conditions do not balance {conditions.residual:.1g} of the gradient"
 
 
 def _count_unknowns(program: LocalProgram) -> tuple[int, int]:
-    """Parameters with an effect plus the abscissa; active rows, less the equations that define other variables."""
+    """Number of unknowns: parameters with an effect and the abscissa. Number of active rows that restrict them."""
     unknowns = sum(name in program.problem.free for name in program.variables) + 1
     return unknowns, len(program.rows) - (len(program.x) - unknowns)
 
 
-def _describe_descent(program: LocalProgram, found: Conditions) -> str:
-    """How the objective improves, to first order or by its curvature."""
-    if curvature_sign(found.curvature) < 0:
+def _describe_descent(program: LocalProgram, conditions: Conditions) -> str:
+    """How the objective improves: to first order, or by its curvature."""
+    if curvature_sign(conditions.curvature) < 0:
         return "it is stationary, but second derivatives let it improve along the active conditions"
-    if not found.independent or found.residual > STATIONARY:
-        return _describe_residual(found)
+    if not conditions.independent or conditions.residual > STATIONARY:
+        return _describe_residual(conditions)
     ways = {"c1": "roots move left of the others", "c2": "a multiple root splits"}
-    scaled = zip(program.rows, found.scaled, strict=True)
-    listed = [ways.get(h.name, f"the design moves away from {h.name}") for h, y in scaled if h.signed and y < -POSITIVE]
-    return f"it improves if {' and if '.join(dict.fromkeys(listed))}"
+    scaled_rows = zip(program.rows, conditions.scaled, strict=True)
+    improvements = [
+        ways.get(h.name, f"the design moves away from {h.name}") for h, y in scaled_rows if h.signed and y < -POSITIVE
+    ]
+    return f"it improves if {' and if '.join(dict.fromkeys(improvements))}"
 
 
 def _describe_better_design(solution: Solution, better: BetterDesign) -> str:
@@ -271,28 +276,30 @@ def _describe_better_design(solution: Solution, better: BetterDesign) -> str:
     return f"{', '.join(parts)} gives {better.value:.6g}"
 
 
-def _rightmost_roots(program: LocalProgram, found: Conditions) -> tuple[RightmostRoot, ...]:
+def _list_rightmost_roots(program: LocalProgram, conditions: Conditions) -> tuple[RightmostRoot, ...]:
     """The roots on the rightmost line with their multipliers."""
-    listed, rows = [], list(zip(program.rows, found.multipliers.tolist(), strict=True))
+    rightmost_roots, rows = [], list(zip(program.rows, conditions.multipliers.tolist(), strict=True))
     model = program.problem.model
     total = sum(program.line[h.cluster].multiplicity * y for h, y in rows if h.name == "c1")
     for k, root in enumerate(program.line):
-        own = {h.name: y for h, y in rows if h.cluster == k}
-        first, second = own.pop("c1"), own.pop("c2", math.nan)
+        multipliers = {h.name: y for h, y in rows if h.cluster == k}
+        first, second = multipliers.pop("c1"), multipliers.pop("c2", math.nan)
         share = root.multiplicity * first / total if total else math.nan
         beta = first / 2 if root.im else first  # β moves both roots of a pair by β/2
         # the user's root of a complex system is the conjugate
-        (shown,) = user_roots(model, [root if model.carrier is None else replace(root, im=-root.im)])
-        omega = (complex(w.re, w.im) for w in eigenfrequencies(model, [shown]))
-        ties = tuple(own.values())
-        listed.append(RightmostRoot(shown.re, shown.im, root.multiplicity, share, beta, second, ties, *omega))
-    return tuple(listed)
+        (user_root,) = user_roots(model, [root if model.carrier is None else replace(root, im=-root.im)])
+        omega = (complex(w.re, w.im) for w in eigenfrequencies(model, [user_root]))
+        ties = tuple(multipliers.values())
+        rightmost_roots.append(
+            RightmostRoot(user_root.re, user_root.im, root.multiplicity, share, beta, second, ties, *omega)
+        )
+    return tuple(rightmost_roots)
 
 
-def _limit_gains(solution: Solution, program: LocalProgram, found: Conditions) -> Mapping[str, float]:
-    """Gain of the objective per unit of relaxation; for an equality, change per unit added to the right-hand side."""
+def _compute_limit_gains(solution: Solution, program: LocalProgram, conditions: Conditions) -> Mapping[str, float]:
+    """Gain of the objective per unit of relaxation; for an equality, per unit that is added to the right-hand side."""
     problem, limits = program.problem, dict[str, float]()
-    for h, y, firm in zip(program.rows, found.multipliers.tolist(), found.firm, strict=True):
+    for h, y, firm in zip(program.rows, conditions.multipliers.tolist(), conditions.firm, strict=True):
         if h.name in problem.constraints:
             limits[h.name] = y if h.signed else problem.sign * y
         elif h.signed and h.cluster < 0 and firm and (name := h.name.rsplit(".", 1)[0]) in problem.free:

@@ -1,20 +1,20 @@
-"""The smooth program around a design: factors for the roots on the rightmost line, and all active limits.
+"""Builds the smooth program around a design: factors for the roots on the rightmost line, and all active limits.
 
-About the line Re s = γ the polynomial splits into factors without common roots,
+Relative to the line Re s = γ, the polynomial is a product of factors without common roots,
 
     p(t + γ; θ) = a0(θ) · q₁(t) ⋯ q_k(t) · r(t),
 
 with one factor q of degree m for each m-fold root on the line, and r for the roots left of it. The coefficients of the
-factors are smooth functions of θ and γ even where the roots are not, because the Jacobian of a product with respect to
-its factors is regular as long as they have no common root. Write q = tᵐ + c₁ tᵐ⁻¹ + … + c_m for a real root, and the
-same in t − iω with complex c (and real c₁, which fixes ω) for a complex root. The roots are on the line where c = 0,
-and none passes it only if
+factors are smooth functions of θ and γ, even if the roots are not, because the Jacobian of a product with respect to
+its factors is regular as long as they have no common root. Write q = tᵐ + c₁ tᵐ⁻¹ + … + c_m for a real root. For a
+complex root, write the same in t − iω with complex c (and real c₁, which fixes ω). The roots are on the line if c = 0,
+and no root moves to the right of it only if
 
     c₁ ≥ 0 (roots move left),  Re c₂ ≥ 0 (roots split along the line),  Im c₂ = c₃ = … = 0 to first order,
 
 because |Im c₂| ≤ c₁ √Re c₂ and c₃ ≤ c₁ c₂: a change ε of another coefficient would move a root by ε^(1/m) to the right.
 For EP4 as two factors t² + βᵢ t + κᵢ we have c₁ = β₁ + β₂ and c₂ = κ₁ + κ₂ + β₁β₂. So βᵢ and κᵢ have the multipliers
-of c₁ and c₂, however the multiple root is divided between factors.
+of c₁ and c₂, for any division of the multiple root between the factors.
 """
 
 from collections.abc import Sequence
@@ -32,9 +32,9 @@ from tmsopt.program.nlp import NLP
 from tmsopt.records import Array
 from tmsopt.roots import Root, product, shift
 
-_ACTIVE = 2e-9  # largest slack of an active constraint, relative to 1 + |limit|: twice the tolerance of feasibility
-_AT = 1e-12  # largest distance of an active bound, relative to its size and the width of its range
-_LINE = 1e-6  # relative difference of real parts on one vertical line, for roots of an exact structure
+_MAX_SLACK = 2e-9  # largest slack of an active constraint, relative to 1 + |limit|; twice the feasibility tolerance
+_BOUND_DISTANCE = 1e-12  # largest distance of an active bound, relative to its size and the width of its range
+_SAME_LINE = 1e-6  # largest relative difference of the real parts of roots on one line, for an exact structure
 _ROOT_ROWS = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY)  # rows of factors, which this program replaces
 
 
@@ -48,9 +48,9 @@ class ActiveRow:
 
     Attributes:
         name: a constraint, a bound, ``roots`` for an equation of the factors, or ``c1 …`` for a coefficient.
-        signed: whether it may become positive; otherwise it stays 0.
-        cluster: index of the root on the line to whose factor it belongs; −1 for other rows.
-        size: its natural size.
+        signed: whether the expression may become positive; otherwise it stays 0.
+        cluster: index of the root on the line whose factor the row belongs to; −1 for other rows.
+        size: natural size of the expression.
     """
 
     name: str
@@ -65,12 +65,12 @@ class LocalProgram:
 
     Attributes:
         problem: the problem with the objective f.
-        variables: names, the free parameters with an effect first, each as itself or as its tangent.
+        variables: names of the variables. The free parameters with an effect come first; angles are given by tangents.
         x: the point.
         sizes: natural size of each variable.
         rows: one for each component of h.
         functions: (x, y) → ∇f, h, ∂h/∂x and the Hessian of f − y·h.
-        line: the roots on the rightmost line, and the upper root of each complex pair there.
+        line: the roots on the rightmost line, and the upper root of each complex pair on it.
         idle: free parameters without an effect.
     """
 
@@ -85,13 +85,13 @@ class LocalProgram:
 
     def evaluate(self, x: Array, y: Array | None = None) -> tuple[Array, Array, Array, Array]:
         """∇f, h, ∂h/∂x, and the Hessian of f − y·h."""
-        found = self.functions(x, np.zeros(len(self.rows)) if y is None else y)
-        gradient, h, jacobian, hessian = (part.full() for part in found)
+        outputs = self.functions(x, np.zeros(len(self.rows)) if y is None else y)
+        gradient, h, jacobian, hessian = (part.full() for part in outputs)
         return gradient.ravel(), h.ravel(), jacobian, hessian
 
 
 def build_program(problem: Posed, solution: Solution) -> LocalProgram:
-    """The program of a problem at a design, built from the roots of its structure without computing any root.
+    """The program of a problem at a design. It uses the roots of the structure and computes no root.
 
     Raises:
         NotCovered: if the damping ratio or frequency is active, or the abscissa is not.
@@ -103,49 +103,51 @@ def build_program(problem: Posed, solution: Solution) -> LocalProgram:
     for n in nlp.variables[len(free) :]:  # nan for the coefficients of factors, which are not used here
         at[n] = float(values[n]) / units.get(n, 1.0) if n in values else np.nan
     x = {n: ca.SX.sym(n) for n in at}
-    every = ca.vertcat(*x.values())
-    f, g = nlp.symbolic(every)
-    reached = nlp.evaluate(np.nan_to_num([*at.values()], posinf=0.0, neginf=0.0))[1]
-    tied = {n: _defining_rows(nlp, n) for n in x if n in nlp.rows and n not in _ROOT_ROWS}
+    all_variables = ca.vertcat(*x.values())
+    f, g = nlp.symbolic(all_variables)
+    row_values = nlp.evaluate(np.nan_to_num([*at.values()], posinf=0.0, neginf=0.0))[1]
+    rows_of = {n: _defining_rows(nlp, n) for n in x if n in nlp.rows and n not in _ROOT_ROWS}
     # a maximum whose constant argument is the largest one here
-    steady = [n for n, rows in tied.items() if all(nlp.row_upper[k] > 0 and reached[k] > _ACTIVE for k in rows)]
-    f, g = ca.substitute([f, g], [x[n] for n in steady], [ca.SX(at[n]) for n in steady])
+    constant_names = [
+        n for n, rows in rows_of.items() if all(nlp.row_upper[k] > 0 and row_values[k] > _MAX_SLACK for k in rows)
+    ]
+    f, g = ca.substitute([f, g], [x[n] for n in constant_names], [ca.SX(at[n]) for n in constant_names])
     build = _Builder()
     for k, name in enumerate(nlp.rows):
-        if name in problem.constraints and ca.depends_on(g[k], every):
-            build.add_nlp_row(nlp, k, g, reached)
-    needed = [n for n in x if n == "abscissa"]
+        if name in problem.constraints and ca.depends_on(g[k], all_variables):
+            build.add_nlp_row(nlp, k, g, row_values)
+    needed_names = [n for n in x if n == "abscissa"]
     for _ in nlp.lifts:
         binding = ca.vertcat(f, *build.expressions)
-        for n in [n for n in x if n not in free and n not in needed and ca.depends_on(binding, x[n])]:
-            needed.append(n)
+        for n in [n for n in x if n not in free and n not in needed_names and ca.depends_on(binding, x[n])]:
+            needed_names.append(n)
             for k in _defining_rows(nlp, n):
-                build.add_nlp_row(nlp, k, g, reached)
-    if active := [n.replace("_", " ") for n in ("damping_ratio", ANGULAR_FREQUENCY) if n in needed]:
+                build.add_nlp_row(nlp, k, g, row_values)
+    if active := [n.replace("_", " ") for n in ("damping_ratio", ANGULAR_FREQUENCY) if n in needed_names]:
         raise NotCovered(f"the {active[0]} is active, which the conditions on the abscissa do not cover")
-    if not (needed and ca.depends_on(ca.vertcat(f, *build.expressions), x["abscissa"])):
+    if not (needed_names and ca.depends_on(ca.vertcat(f, *build.expressions), x["abscissa"])):
         raise NotCovered("the abscissa is not active, so this optimum does not depend on the roots")
     roots = solution.of_polynomial.roots
     size = max(float(np.hypot(r.re, r.im)) for r in roots)
-    near = 0.0 if solution.of_polynomial.name in ("pair", "real") else _LINE * size
-    right = [r for r in roots if r.re >= solution.abscissa - near]
-    line = tuple(r for r in right if r.im >= 0)
+    line_width = 0.0 if solution.of_polynomial.name in ("pair", "real") else _SAME_LINE * size
+    line_roots = [r for r in roots if r.re >= solution.abscissa - line_width]
+    line = tuple(r for r in line_roots if r.im >= 0)
     design = {n: ca.atan(x[n]) if problem.parameter_set[n].tangent else x[n] for n in free}
     a = problem.model.coefficients(problem.ordered(design), problem.parameter_set)
     lead = abs(float(values.coefficients[0]))
-    build.add_factors(a, lead, size, nlp.unit * x["abscissa"], line, [r for r in roots if r not in right])
+    build.add_factors(a, lead, size, nlp.unit * x["abscissa"], line, [r for r in roots if r not in line_roots])
     binding = ca.vertcat(f, *build.expressions)
     idle = tuple(n for n in free if not ca.depends_on(binding, x[n]))
     variables = []
-    for n in (n for n in x if (n in free and n not in idle) or n in needed):
-        own = size / nlp.unit if n == "abscissa" else max(abs(at[n]), 1e-3)
+    for n in (n for n in x if (n in free and n not in idle) or n in needed_names):
+        natural_size = size / nlp.unit if n == "abscissa" else max(abs(at[n]), 1e-3)
         if n in free:
             low, high = (float(np.tan(e)) if problem.parameter_set[n].tangent else e for e in free[n])
-            own = max(abs(at[n]), min(high - low, 1.0), 1e-12)  # a range wider than 1 is no measure of size
+            natural_size = max(abs(at[n]), min(high - low, 1.0), 1e-12)  # a range wider than 1 is no measure of size
             for end, limit, side in zip(("min", "max"), free[n], (1, -1), strict=True):
-                if abs(solution.parameters[n] - limit) <= _AT * (abs(limit) + np.ptp(free[n])):
+                if abs(solution.parameters[n] - limit) <= _BOUND_DISTANCE * (abs(limit) + np.ptp(free[n])):
                     build.add_row(ActiveRow(f"{n}.{end}", True), side * (x[n] - at[n]))
-        variables.append((n, x[n], at[n], own))
+        variables.append((n, x[n], at[n], natural_size))
     names, symbols, point, sizes = zip(*variables, *build.unknowns, strict=True)
     z, h = ca.vertcat(*symbols), ca.vertcat(*build.expressions)
     y = ca.SX.sym("y", h.numel())
@@ -163,13 +165,13 @@ def build_program(problem: Posed, solution: Solution) -> LocalProgram:
 
 
 def _defining_rows(nlp: NLP, name: str) -> list[int]:
-    """Rows that define an added variable by the parameters; a constant argument of a maximum has slack and does not."""
+    """Rows that define an added variable by the parameters, but not the row of a constant argument of a maximum."""
     rows = enumerate(zip(nlp.rows, nlp.row_lower, strict=True))
     return [k for k, (row, lower) in rows if row == name and row not in _ROOT_ROWS and lower == 0]
 
 
 class _Builder:
-    """Collects active rows with their expressions, and the coefficients of factors: name, symbol, value, size."""
+    """Collects active rows with their expressions, and the unknown coefficients: name, symbol, value and size."""
 
     def __init__(self) -> None:
         self.rows: list[ActiveRow] = []
@@ -180,11 +182,11 @@ class _Builder:
         self.rows.append(row)
         self.expressions.append(expression)
 
-    def add_nlp_row(self, nlp: NLP, k: int, g: Any, reached: Array) -> None:
+    def add_nlp_row(self, nlp: NLP, k: int, g: Any, row_values: Array) -> None:
         """Add a row of the NLP if it is an equality or active."""
         name, lower, upper = nlp.rows[k], nlp.row_lower[k], nlp.row_upper[k]
         for end, side in ((lower, 1), (upper, -1)):
-            if np.isfinite(end) and (lower == upper or abs(reached[k] - end) <= _ACTIVE * (1 + abs(end))):
+            if np.isfinite(end) and (lower == upper or abs(row_values[k] - end) <= _MAX_SLACK * (1 + abs(end))):
                 self.add_row(ActiveRow(name, lower != upper), side * (g[k] - end))
                 return
 
@@ -193,9 +195,13 @@ class _Builder:
         return self.unknowns[-1][1]
 
     def add_factors(
-        self, a: Sequence[Any], lead: float, size: float, gamma: Any, line: Sequence[Root], others: Sequence[Root]
+        self, a: Sequence[Any], lead: float, size: float, gamma: Any, line: Sequence[Root], other_roots: Sequence[Root]
     ) -> None:
-        """Add p(t + γ) = a0 · ∏ q · r; the given roots fix the values of the unknowns. `lead` is |a0|."""
+        """Add the equations p(t + γ) = a0 · ∏ q · r; the roots give the values of the unknowns.
+
+        Args:
+            lead: |a0|, the size of the leading coefficient.
+        """
         factors = []
         for j, root in enumerate(line):
 
@@ -215,8 +221,8 @@ class _Builder:
                 im[-1] += add_coefficient(f"im c{k}", k, False) if root.im and k > 1 else 0
             pair = [x + y for x, y in zip(product(re, re), product(im, im), strict=True)]
             factors.append(pair if root.im else re)
-        rest = [complex(r.re, r.im) - line[0].re for r in others for _ in range(r.multiplicity)]
-        monic = np.atleast_1d(np.poly(rest)).real.tolist()
+        left_roots = [complex(r.re, r.im) - line[0].re for r in other_roots for _ in range(r.multiplicity)]
+        monic = np.atleast_1d(np.poly(left_roots)).real.tolist()
         factors.append([1, *(self.add_unknown(f"r{k}", monic[k], size**k) for k in range(1, len(monic)))])
         shifted, multiplied = shift(a, gamma), product(*factors)
         for k in range(1, len(shifted)):

@@ -1,4 +1,4 @@
-"""How a multiple root splits under a small change: the leading terms of Puiseux series, by Newton's polygon."""
+"""Computes how a multiple root splits under a small change: leading terms of Puiseux series, by Newton's polygon."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-_SAME = 1e-9  # relative difference of coefficients up to which an edge counts as the power of a linear polynomial
+_SAME_COEFFICIENT = 1e-9  # relative difference of coefficients up to which a polynomial is a power of a linear one
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Branches:
 
     Attributes:
         roots: number of roots.
-        constants: one for each cycle of `denominator` roots.
+        constants: one constant for each group of `denominator` roots.
     """
 
     roots: int
@@ -38,46 +38,46 @@ class Branches:
 
     def shifts(self, eps: float) -> list[complex]:
         """All t for a real ε, to leading order."""
-        found: list[complex] = []
+        shifts: list[complex] = []
         for constant in self.constants:
             first = (complex(constant) * eps**self.numerator) ** (1 / self.denominator)
-            found += [first * np.exp(2j * np.pi * k / self.denominator) for k in range(self.denominator)]
-        return found
+            shifts += [first * np.exp(2j * np.pi * k / self.denominator) for k in range(self.denominator)]
+        return shifts
 
 
 def find_branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, ...], int]:
-    """Branches of Σ terms[m][j] ε^m t^j = 0 that start at t = 0, fastest first, and the number of unmoved roots.
+    """Branches of Σ terms[m][j] ε^m t^j = 0 that start at t = 0, the fastest first, and the number of unmoved roots.
 
-    The last j is the multiplicity, and terms[0][j] is 0 for all j below it. Zeros must be exact. Roots that do not move
-    in the given orders count as unmoved.
+    The largest j is the multiplicity, and terms[0][j] is 0 for all smaller j. Zeros must be exact. Roots that do not
+    move in the given orders of ε count as unmoved.
     """
     k = len(terms[0]) - 1
     first = {j: next((m for m, row in enumerate(terms) if row[j] != 0), None) for j in range(k + 1)}
     points = [(j, m) for j, m in first.items() if m is not None]
     hull: list[tuple[int, int]] = []
     for j, m in points:  # lower convex hull from left to right
-        while len(hull) > 1 and _slope(hull[-2], hull[-1]) >= _slope(hull[-2], (j, m)):
+        while len(hull) > 1 and _compute_slope(hull[-2], hull[-1]) >= _compute_slope(hull[-2], (j, m)):
             hull.pop()
         hull.append((j, m))
-    found = []
+    branches = []
     for (j1, m1), (j2, m2) in pairwise(hull):
         width, drop = j2 - j1, m1 - m2
         q = width // gcd(width, drop)
         polynomial = [complex(terms[m1 - i * q * drop // width][j1 + i * q]) for i in reversed(range(width // q + 1))]
-        found.append(Branches(width, drop * q // width, q, _roots(np.array(polynomial))))
-    return tuple(sorted(found, key=lambda b: b.exponent)), hull[0][0] if hull else k
+        branches.append(Branches(width, drop * q // width, q, _find_edge_roots(np.array(polynomial))))
+    return tuple(sorted(branches, key=lambda b: b.exponent)), hull[0][0] if hull else k
 
 
-def _roots(polynomial: NDArray[np.complex128]) -> tuple[complex, ...]:
-    """Roots of the polynomial of an edge; for the power of a linear polynomial their mean, k times."""
+def _find_edge_roots(polynomial: NDArray[np.complex128]) -> tuple[complex, ...]:
+    """Roots of the polynomial of an edge; if it is the power of a linear polynomial, the mean of its roots, k times."""
     k = len(polynomial) - 1
     mean = -polynomial[1] / (k * polynomial[0])
     power = polynomial[0] * np.poly(np.full(k, mean))
     terms = np.abs(polynomial[0]) * np.poly(np.full(k, -np.abs(mean)))
-    if np.all(np.abs(power - polynomial) <= _SAME * terms):
+    if np.all(np.abs(power - polynomial) <= _SAME_COEFFICIENT * terms):
         return (complex(mean),) * k
     return tuple(complex(z) for z in np.roots(polynomial))
 
 
-def _slope(a: tuple[int, int], b: tuple[int, int]) -> Fraction:
+def _compute_slope(a: tuple[int, int], b: tuple[int, int]) -> Fraction:
     return Fraction(b[1] - a[1], b[0] - a[0])

@@ -1,4 +1,4 @@
-"""The effect of rounded parameters on the roots of a design, in exact arithmetic."""
+"""Computes the effect of rounded parameters on the roots of a design, in exact arithmetic."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -19,30 +19,30 @@ from tmsopt.problem.unit_system import Unit, unit_of
 from tmsopt.records import Table, plain
 
 ALONE = 3
-"""Significant digits to which each parameter is rounded alone."""
+"""Significant digits of a parameter that is the only rounded one."""
 
 DIGITS = (2, 3, 4, 6)
 """Significant digits to which all parameters are rounded together."""
 
-_SAME = 1e-15  # relative change that is not rounding, as of a degree or two in radians
+_UNROUNDED = 1e-15  # largest relative change that is no rounding, for example by converting radians
 _DEGREE = math.pi / 180
-_LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
+_LARGEST_DENOMINATOR = 10**6  # largest denominator of a factor between units, such as 5/18
 _DECIMALS = 140  # decimal digits of the exact numbers
 
 
 @dataclass(frozen=True)
 class RoundedDesign:
-    """A design with parameters rounded to significant digits, in the unit in which each is reported.
+    """A design with parameters rounded to significant digits, each in the unit of the report.
 
     Attributes:
         digits: significant digits.
         written: rounded parameter → the decimal number with its unit, e.g. ``23.5 deg``.
-        realised: abscissa of the decimals, exact to double precision, with the other parameters as stored. With
-            scenarios or tolerances, the worst over all bands and tolerance boxes.
+        realised: abscissa of the decimal numbers, exact to double precision; the other parameters are as stored. With
+            scenarios or tolerances, it is the worst abscissa over all bands and tolerance boxes.
         loss: realised abscissa minus the ideal abscissa of the design.
-        damping_ratio: damping ratio of the rounded design, the worst one as well.
-        objective: value of the objective; nan without one.
-        violations: constraint or bound that the rounding violates → amount, in its own unit (rad, SI).
+        damping_ratio: damping ratio of the rounded design, also the worst one.
+        objective: value of the objective; nan without an objective.
+        violations: constraint or bound that the rounding violates → amount, in the unit of the constraint (rad, SI).
     """
 
     digits: int
@@ -55,27 +55,29 @@ class RoundedDesign:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        found = plain(self)
-        return {"abscissa_realised" if name == "realised" else name: value for name, value in found.items()}
+        data = plain(self)
+        return {"abscissa_realised" if name == "realised" else name: value for name, value in data.items()}
 
 
 def list_rounded_designs(solution: Solution) -> tuple[Table[RoundedDesign], tuple[RoundedDesign, ...]]:
-    """Each free parameter rounded alone, unless it has no more digits, and all together to increasing digits."""
+    """Each free parameter rounded alone, if it has more digits, and all of them together to 2, 3, 4 and 6 digits."""
     names = list(solution.problem.free)
-    alone = [n for n in names if not _is_short(solution, n)]
-    found = round_design(solution, [*(([n], ALONE) for n in alone), *((names, digits) for digits in DIGITS if names)])
-    return Table(dict(zip(alone, found, strict=False))), found[len(alone) :]
+    names_alone = [n for n in names if not _is_short(solution, n)]
+    designs = round_design(
+        solution, [*(([n], ALONE) for n in names_alone), *((names, digits) for digits in DIGITS if names)]
+    )
+    return Table(dict(zip(names_alone, designs, strict=False))), designs[len(names_alone) :]
 
 
 def round_design(solution: Solution, choices: Sequence[tuple[Sequence[str], int]]) -> tuple[RoundedDesign, ...]:
     """The design with some parameters rounded, for each choice (names, significant digits)."""
-    problem, found = solution.problem.posed, []
+    problem, rounded_designs = solution.problem.posed, []
     with flint.ctx.workdps(_DECIMALS), np.errstate(all="ignore"):  # undefined values become nan or inf
         for names, digits in choices:
             units = {n: unit_of(problem, n) for n in names}
             written = {n: _format_decimal(solution, n, unit, digits) for n, unit in units.items()}
             design = {**solution.parameters, **{n: _parse_exact(text, units[n]) for n, text in written.items()}}
-            values, violated = recheck_exactly(problem, design, _cases(solution, design))
+            values, violated = recheck_exactly(problem, design, _list_cases(solution, design))
             abscissa, roots = float(values["abscissa"]), values["structure"].roots
             has_ratio = sum(r.multiplicity for r in roots) == problem.model.degree and problem.model.carrier is None
             row = RoundedDesign(
@@ -85,14 +87,14 @@ def round_design(solution: Solution, choices: Sequence[tuple[Sequence[str], int]
                 loss=abscissa - solution.abscissa,
                 damping_ratio=float(values["damping_ratio"]) if has_ratio else math.nan,  # not with a root at infinity
                 objective=float(problem.objective(values)) if problem.objective else math.nan,
-                violations=Table(violated | _range_violations(problem, design)),
+                violations=Table(violated | _find_range_violations(problem, design)),
             )
-            found.append(row)
-    return tuple(found)
+            rounded_designs.append(row)
+    return tuple(rounded_designs)
 
 
-def _cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
-    """The listed cases, the worst case of the unrounded design and the worst cases of the rounded one."""
+def _list_cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
+    """The listed cases, the worst case of the unrounded design, and the worst cases of the rounded design."""
     problem = solution.problem.posed
     cases = [*problem.cases, *filter(None, [solution.worst])]
     if problem.scenarios or problem.tolerances:
@@ -100,8 +102,8 @@ def _cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
     return cases
 
 
-def _range_violations(problem: Posed, design: Mapping[str, Any]) -> dict[str, float]:
-    """Ends of ranges that a design exceeds → amount."""
+def _find_range_violations(problem: Posed, design: Mapping[str, Any]) -> dict[str, float]:
+    """Ends of ranges that a design exceeds → the amount."""
     return {
         f"{name}.{end}": amount
         for name, ends in problem.free.items()
@@ -111,13 +113,13 @@ def _range_violations(problem: Posed, design: Mapping[str, Any]) -> dict[str, fl
 
 
 def _is_short(solution: Solution, name: str) -> bool:
-    """Whether rounding a parameter alone leaves it unchanged."""
+    """Whether a parameter has so few digits that rounding leaves it unchanged."""
     value, unit = solution.parameters[name], unit_of(solution.problem.posed, name)
-    return abs(float(_format_decimal(solution, name, unit, ALONE)) * unit.one - value) <= _SAME * abs(value)
+    return abs(float(_format_decimal(solution, name, unit, ALONE)) * unit.one - value) <= _UNROUNDED * abs(value)
 
 
 def _format_decimal(solution: Solution, name: str, unit: Unit, digits: int) -> str:
-    """A parameter in its reported unit as a decimal, rounded inwards at an end of its range."""
+    """A parameter in the unit of the report as a decimal; at an end of its range it is rounded inwards."""
     value = solution.parameters[name] / unit.one
     low, high = (end / unit.one for end in solution.problem.free.get(name, (-math.inf, math.inf)))
     text = f"{value:#.{digits}g}".removesuffix(".")
@@ -129,7 +131,7 @@ def _format_decimal(solution: Solution, name: str, unit: Unit, digits: int) -> s
 
 
 def _parse_exact(text: str, unit: Unit) -> flint.arb:
-    """The decimal in the parameter's own unit, at the precision of the context."""
+    """The decimal number in the unit in which the parameter is stored, at the precision of the context."""
     if unit.one == _DEGREE:
         return flint.arb(text) * flint.arb.pi() / 180
     share = Fraction(unit.one).limit_denominator(_LARGEST_DENOMINATOR)

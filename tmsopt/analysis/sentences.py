@@ -1,4 +1,4 @@
-"""One sentence each on the structure of a solution and on what is proved about it."""
+"""Sentences about the structure of a solution and about the proofs of its quality."""
 
 import math
 from collections.abc import Sequence
@@ -15,23 +15,25 @@ _DIGITS = 12
 _NOT_COVERED = {ANGULAR_FREQUENCY: "frequencies", RADIUS: "the robustness radius"}
 
 
-def structure_line(problem: Posed, structure: str, abscissa: float, known: Sequence[MultipleRoot]) -> str:
-    """The structure of the roots, and whether its multiple root is defective where that is not so or unknown.
+def structure_line(problem: Posed, structure: str, abscissa: float, multiple_roots: Sequence[MultipleRoot]) -> str:
+    """The structure of the roots. If its multiple root is not defective, or this is unknown, the sentence says so.
 
     Args:
-        known: the multiple roots, rightmost first.
+        multiple_roots: the multiple roots, rightmost first.
     """
     words = describe_user_structure(problem.model, structure, abscissa > 0)
-    multiple = known if problem.pattern is not None else [m for m in known if m.re == known[0].re]
+    multiple = (
+        multiple_roots if problem.pattern is not None else [m for m in multiple_roots if m.re == multiple_roots[0].re]
+    )
     if crossing := next((m for m in multiple if not m.exceptional), None):
         return f"{words}: {describe_crossing(crossing)}"
-    if known and problem.model.pencil is None and "EP" in f"{problem.locate or ''}{structure}":
+    if multiple_roots and problem.model.pencil is None and "EP" in f"{problem.locate or ''}{structure}":
         return f"{words}; coefficients cannot tell whether it is defective"
     return words
 
 
 def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
-    """Whether it is proved that no solution is better, and if not, how to go on."""
+    """Whether it is proved that no solution is better; if not, what the user can do."""
     bound, problem = solution.bound, solution.problem.posed
     text = (problem.minimize or problem.maximize or "").strip()
     names = [words for name, words in _NOT_COVERED.items() if problem.asks(name)]
@@ -39,9 +41,9 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
     if solution.status == "infeasible":
         if bound.proven:
             return "no design meets all limits"
-        known = "no design is stable (proved); " if solution.any_stable is False else ""
+        statement = "no design is stable (proved); " if solution.any_stable is False else ""
         advice = not_covered or _advise_certify(bound, "--certify looks for a proof")
-        return _append(f"{known}infeasibility is not proved{_search_effort(bound)}", advice)
+        return _append_advice(f"{statement}infeasibility is not proved{_search_effort(bound)}", advice)
     if not problem.free:
         return "nothing is free, so there is no optimum to prove; tmsopt prove proves the roots"
     if not text:
@@ -50,17 +52,19 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
         count = solution.freedom.count
         family = {1: "a curve", 2: "a surface"}.get(count, f"a {count}-parameter family")
         trace = ", which tmsopt trace follows" if count == 1 else ""
-        more = f"; it belongs to {family} of such designs{trace}" if count > 0 else ""
-        return f"tmsopt prove FILE proves or refutes that this design exists{more}"
+        family_text = f"; it belongs to {family} of such designs{trace}" if count > 0 else ""
+        return f"tmsopt prove FILE proves or refutes that this design exists{family_text}"
     if bound.proven:
         return f"{no_design(problem)} {describe_better(solution, text)} ({bound.method})"
     if math.isfinite(bound.value):
         unit = common_unit(problem, text)
         value, gap = unit.show(bound.value, 6), unit.show(bound.gap, 2)
-        known = f"{no_design(problem)} is {_side(problem)} {value} ({bound.method}), gap {gap}{_search_effort(bound)}"
-        return _append(known, not_covered or _advise_certify(bound, "--certify tries to close it"))
+        statement = (
+            f"{no_design(problem)} is {_bound_side(problem)} {value} ({bound.method}), gap {gap}{_search_effort(bound)}"
+        )
+        return _append_advice(statement, not_covered or _advise_certify(bound, "--certify tries to close it"))
     advice = not_covered or _advise_certify(bound, "--certify looks for a proof or a better design")
-    return _append(f"not proved to be the best{_search_effort(bound)}", advice)
+    return _append_advice(f"not proved to be the best{_search_effort(bound)}", advice)
 
 
 def bound_lines(solution: Solution) -> list[str]:
@@ -74,7 +78,7 @@ def bound_lines(solution: Solution) -> list[str]:
         return [f"proved: no design satisfies all constraints ({how})"] if bound.proven else []
     if not math.isfinite(bound.value):
         return [f"bound: none found in time ({search})"] if bound.seconds else []
-    which = f"{no_design(problem)} is {_side(problem)} {Unit().number(bound.value, _DIGITS)}"
+    which = f"{no_design(problem)} is {_bound_side(problem)} {Unit().number(bound.value, _DIGITS)}"
     lines = [f"bound: {which} ({bound.method}); gap {bound.gap:.1e}"]
     if bound.method == bound.solver.lower():
         lines.append(f"how: {search}; {kind}")
@@ -83,16 +87,16 @@ def bound_lines(solution: Solution) -> list[str]:
     return lines
 
 
-def _side(problem: Posed) -> str:
+def _bound_side(problem: Posed) -> str:
     return "above" if problem.sense == "maximize" else "below"
 
 
-def _append(text: str, advice: str) -> str:
+def _append_advice(text: str, advice: str) -> str:
     return f"{text}; {advice}" if advice else text
 
 
 def _advise_certify(bound: Bound, first: str) -> str:
-    """Advice on --certify: twice the time where it ran out, none where branch and bound cannot take the problem."""
+    """Advice on --certify: twice the time if the time ran out; empty if branch and bound cannot solve the problem."""
     if not bound.solver:
         return first
     return f"--certify {max(2 * math.ceil(bound.seconds), 1)} continues the search" if bound.seconds else ""

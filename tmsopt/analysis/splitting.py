@@ -1,4 +1,4 @@
-"""Splitting of a multiple root under a changing parameter: laws from Newton's polygon, each confirmed by the roots."""
+"""Finds laws by which a multiple root splits when a parameter changes, and confirms each law by computed roots."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,17 +12,17 @@ from tmsopt.analysis.puiseux import Branches, find_branches
 from tmsopt.analysis.root_point import RootPoint, coefficients_of_order, midpoint
 
 DEVIATION = 0.1
-"""Relative deviation of a root from the leading term up to which the law holds."""
+"""Largest relative deviation of a root from the leading term for which the law holds."""
 
 _DECADES = range(-16, 1)  # powers of ten at which a law is tested
-_WITHIN = (0.75, 0.5, 0.25)  # shares of the decade before the first failure that are tested too
-_SCALES = 2  # decades over which a law must hold on both sides to be confirmed
-_SLOWER = 1e-13  # relative coefficient that counts as 0: its roots are far slower than those of the law
-_STILL = (1e-2, 1e-4)  # changes at which unmoved roots are counted
-_SMALL = (1e-11, 1e-8, 1e-5)  # radii for that count, relative to the least shift or to the size of the roots
-_WIDE = (1e-3, 3e-2)  # further radii where other roots move
-_CLEAR = 2  # smallest shift that is tested, relative to the scatter of the roots
-_SCATTER = 8  # radius for the count where nothing moves, relative to the scatter of the roots
+_DECADE_SHARES = (0.75, 0.5, 0.25)  # shares of the decade before the first failure that are also tested
+_MIN_DECADES = 2  # decades over which a law must hold on both sides to be confirmed
+_NEGLIGIBLE_SHARE = 1e-13  # share of coefficients that count as 0, because their roots move far more slowly
+_COUNTED_CHANGES = (1e-2, 1e-4)  # changes at which unmoved roots are counted
+_SMALL_RADII = (1e-11, 1e-8, 1e-5)  # radii for this count, relative to the smallest shift or to the size of the roots
+_WIDE_RADII = (1e-3, 3e-2)  # further radii if other roots move
+_MIN_SHIFT = 2  # smallest shift that is tested, relative to the distance of the roots that nearly meet
+_SCATTER_RADIUS = 8  # radius for the count if no root moves, relative to the same distance
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ class Law:
 
     Attributes:
         branches: tᵠ = C εᵖ for the shift t of each root, to leading order.
-        below, above: |ε| up to which every sampled shift is within `DEVIATION` of the law, for ε < 0 and ε > 0; sampled
-            at each decade from 1e-16 to 1, and four times in the last decade that holds.
-        least: |ε| from which the law holds; 0 if at every decade. If the root is multiple only within rounding, shifts
-            below the distance of the scattered roots are not tested.
+        below, above: |ε| up to which every sampled shift is within `DEVIATION` of the law, for ε < 0 and ε > 0. Samples
+            are at each power of ten from 1e-16 to 1, and at four points of the last decade in which the law holds.
+        least: |ε| from which the law holds; 0 if it holds from the first sample. If the root is multiple only up to
+            rounding errors, shifts below the distance of the nearby roots are not tested.
     """
 
     branches: Branches
@@ -48,10 +48,10 @@ class Response:
     """Response of a multiple root to one parameter.
 
     Attributes:
-        relative: whether ε is relative to the parameter's value; it is absolute where that is 0 within rounding.
-        laws: fastest first, only those confirmed by the roots at changes that differ by a factor of 100.
-        unmoved: number of roots that stay, to the orders computed.
-        unresolved: number of roots for which neither was confirmed.
+        relative: whether ε is relative to the parameter's value; it is absolute if the value is 0 up to rounding.
+        laws: the laws that computed roots confirm over a factor of 100 of ε; the fastest law comes first.
+        unmoved: number of roots that do not move, in the computed orders of ε.
+        unresolved: number of roots that follow no confirmed law and for which it is not confirmed that they stay.
     """
 
     parameter: str
@@ -64,22 +64,22 @@ class Response:
 def compute_response(point: RootPoint, name: str) -> Response:
     """Response of a multiple root to a parameter, at the precision of `high_precision`."""
     k, relative = point.multiplicity, point.relative(name)
-    terms = _terms(point, name)
+    terms = _expand_terms(point, name)
     if terms is None:
         return Response(name, relative, (), 0, k)
-    found, unmoved = find_branches(terms)
-    laws = [law for branch in found if (law := _confirm(point, name, branch))]
-    if unmoved and not _has_fixed_roots(point, name, found, unmoved):
+    branches, unmoved = find_branches(terms)
+    laws = [law for branch in branches if (law := _confirm_law(point, name, branch))]
+    if unmoved and not _has_fixed_roots(point, name, branches, unmoved):
         unmoved = 0
-    left = k - unmoved - sum(law.branches.roots for law in laws)
-    return Response(name, relative, tuple(laws), unmoved, left)
+    unresolved = k - unmoved - sum(law.branches.roots for law in laws)
+    return Response(name, relative, tuple(laws), unmoved, unresolved)
 
 
-def _terms(point: RootPoint, name: str) -> list[list[complex]] | None:
-    """terms[m][j] of ε^m t^j, with t in the root's unit and 0 where rounding allows it; None where undefined.
+def _expand_terms(point: RootPoint, name: str) -> list[list[complex]] | None:
+    """terms[m][j] of ε^m t^j, with t in the unit of the root; None if they are undefined.
 
-    With g independent eigenvectors, p is to leading order the determinant of a g × g matrix that vanishes at the root,
-    so terms of total order below g are 0.
+    A term is 0 if it may be 0 within rounding errors. With g independent eigenvectors, the leading terms of p are the
+    determinant of a g × g matrix that is 0 at the root, so terms of total order below g are 0.
     """
     k, g = point.multiplicity, point.geometric
     series = point.perturb(name, flint.arb_series([0, point.step(name)], prec=2 * k + 1), doubt=True)
@@ -93,84 +93,84 @@ def _terms(point: RootPoint, name: str) -> list[list[complex]] | None:
     ]
 
 
-def _confirm(point: RootPoint, name: str, branch: Branches) -> Law | None:
-    """The law with its range of validity, if the roots obey it at changes of both signs and two sizes; else None."""
-    ends = [_validity_range(point, name, branch, sign) for sign in (-1, 1)]
-    if any(high < 10**_SCALES * max(low, 10.0 ** _DECADES[0]) for low, high in ends):
+def _confirm_law(point: RootPoint, name: str, branch: Branches) -> Law | None:
+    """The law with its range of validity; None unless roots obey it for both signs of ε and over two decades."""
+    ends = [_find_validity_range(point, name, branch, sign) for sign in (-1, 1)]
+    if any(high < 10**_MIN_DECADES * max(low, 10.0 ** _DECADES[0]) for low, high in ends):
         return None
     of_s = replace(branch, constants=tuple(c * point.unit**branch.denominator for c in branch.constants))
     return Law(of_s, ends[0][1], ends[1][1], max(low for low, _ in ends))
 
 
-def _validity_range(point: RootPoint, name: str, branch: Branches, sign: int) -> tuple[float, float]:
-    """The least and the largest sampled |ε| between which the roots obey the law; (0, 0) if nowhere."""
+def _find_validity_range(point: RootPoint, name: str, branch: Branches, sign: int) -> tuple[float, float]:
+    """The smallest and the largest sampled |ε| between which the roots obey the law; (0, 0) if they never do."""
 
     def holds(eps: float) -> bool:
         predicted = branch.shifts(sign * eps)
         scale = max(map(abs, predicted))
-        shifted = _local_coefficients(point, name, sign * eps, scale)
-        # A polynomial in 1/t: its largest roots are sought, and companion eigenvalues give these to all digits.
+        shifted = _expand_locally(point, name, sign * eps, scale)
+        # In the variable 1/t the smallest t are the largest roots, which companion eigenvalues give to all digits.
         row = np.array([midpoint(c / shifted[point.multiplicity].abs_upper()) for c in shifted])
-        row[np.cumsum(np.abs(row)) <= _SLOWER * np.abs(row).sum()] = 0  # roots that are far slower
-        return _deviation(predicted, scale, row) <= DEVIATION
+        row[np.cumsum(np.abs(row)) <= _NEGLIGIBLE_SHARE * np.abs(row).sum()] = 0  # roots that move far more slowly
+        return _measure_deviation(predicted, scale, row) <= DEVIATION
 
-    visible = _CLEAR * _root_scatter(point)
+    visible = _MIN_SHIFT * _measure_scatter(point)
     decades = [m for m in _DECADES if max(map(abs, branch.shifts(sign * 10.0**m))) > visible]
     low = next((m for m in decades if holds(10.0**m)), None)
     if low is None:
         return 0.0, 0.0
-    least = 10.0**low if low > _DECADES[0] else 0.0
+    lower_end = 10.0**low if low > _DECADES[0] else 0.0
     first = next((m for m in decades if m > low and not holds(10.0**m)), None)
     if first is None:
-        return least, 10.0 ** _DECADES[-1]
-    reached = (10.0 ** (first - 1 + share) for share in _WITHIN)
-    return least, next(filter(holds, reached), 10.0 ** (first - 1))
+        return lower_end, 10.0 ** _DECADES[-1]
+    samples = (10.0 ** (first - 1 + share) for share in _DECADE_SHARES)
+    return lower_end, next(filter(holds, samples), 10.0 ** (first - 1))
 
 
-def _has_fixed_roots(point: RootPoint, name: str, moved: Sequence[Branches], unmoved: int) -> bool:
-    """Whether this many roots stay as a parameter changes, by Rouché's theorem at a few changes."""
+def _has_fixed_roots(point: RootPoint, name: str, branches: Sequence[Branches], unmoved: int) -> bool:
+    """Whether `unmoved` roots stay when a parameter changes, by Rouché's theorem for a few changes."""
 
     def count_roots(eps: float, radius: float) -> int | None:
-        """Number of roots within a radius; None where no term outweighs all others there."""
-        terms = [abs(x) for x in _local_coefficients(point, name, eps, radius)]
+        """Number of roots within a radius; None if no term is larger than the sum of all others."""
+        terms = [abs(x) for x in _expand_locally(point, name, eps, radius)]
         return next((u for u, x in enumerate(terms) if 2 * x > sum(terms, flint.arb(0))), None)
 
     def radii(eps: float) -> list[float]:
-        """Radii, in the root's unit, that should contain the fixed roots only."""
-        if not moved:
-            return [max(small, _SCATTER * _root_scatter(point)) for small in _SMALL]
-        least = min(abs(t) for branch in moved for t in branch.shifts(eps))
-        return [small * least for small in (*_SMALL, *_WIDE)]
+        """Radii, in the unit of the root, that should contain only the fixed roots."""
+        if not branches:
+            return [max(small, _SCATTER_RADIUS * _measure_scatter(point)) for small in _SMALL_RADII]
+        least_shift = min(abs(t) for branch in branches for t in branch.shifts(eps))
+        return [small * least_shift for small in (*_SMALL_RADII, *_WIDE_RADII)]
 
-    changes = [(eps, sign) for eps in _STILL for sign in (-1, 1)]
+    changes = [(eps, sign) for eps in _COUNTED_CHANGES for sign in (-1, 1)]
     return all(any(count_roots(sign * eps, radius) == unmoved for radius in radii(eps)) for eps, sign in changes)
 
 
-def _local_coefficients(point: RootPoint, name: str, eps: float, scale: float) -> list[Any]:
+def _expand_locally(point: RootPoint, name: str, eps: float, scale: float) -> list[Any]:
     """Coefficients in t of the perturbed polynomial, corrected for the residual of the unperturbed multiple root."""
     perturbed = point.taylor(point.perturb(name, eps * point.step(name)), scale)
-    own = point.expand(scale)
-    return [a - b if j < point.multiplicity else a for j, (a, b) in enumerate(zip(perturbed, own, strict=True))]
+    unperturbed = point.expand(scale)
+    return [a - b if j < point.multiplicity else a for j, (a, b) in enumerate(zip(perturbed, unperturbed, strict=True))]
 
 
-def _root_scatter(point: RootPoint) -> float:
-    """Distance between the roots that nearly meet, in their unit."""
+def _measure_scatter(point: RootPoint) -> float:
+    """Distance between the roots that nearly meet, in the unit of the root."""
     k = point.multiplicity
     terms = [midpoint(x) for x in point.expand()[: k + 1]]
     return float(max(abs(x / terms[k]) ** (1 / (k - j)) for j, x in enumerate(terms[:k])))
 
 
-def _deviation(predicted: Sequence[complex], scale: float, row: NDArray[np.complex128]) -> float:
-    """The largest relative distance of a predicted shift from its nearest true one; inf if there are too few.
+def _measure_deviation(predicted: Sequence[complex], scale: float, row: NDArray[np.complex128]) -> float:
+    """The largest relative distance of a predicted shift from the nearest true shift; inf if these are too few.
 
     Args:
         row: coefficients of the polynomial in scale/t, descending.
     """
     inverse = np.roots(row) if np.all(np.isfinite(row)) else np.zeros(0)
-    left, worst = list(scale / inverse[inverse != 0]), 0.0
+    true_shifts, worst = list(scale / inverse[inverse != 0]), 0.0
     for t in predicted:
-        nearest = min(range(len(left)), key=lambda i: abs(left[i] - t), default=None)
+        nearest = min(range(len(true_shifts)), key=lambda i: abs(true_shifts[i] - t), default=None)
         if nearest is None:
             return np.inf
-        worst = max(worst, abs(left.pop(nearest) - t) / abs(t))
+        worst = max(worst, abs(true_shifts.pop(nearest) - t) / abs(t))
     return float(worst)

@@ -1,4 +1,4 @@
-"""Steps in the unit in which a problem is written: 1 deg of tilt, 1 cm of length, 1 km/h of speed."""
+"""Steps of limits, in the unit in which a problem is written: 1 deg of tilt, 1 cm of length, 1 km/h of speed."""
 
 import math
 from collections.abc import Iterator
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from tmsopt.models import Range
 from tmsopt.problem.unit_system import Unit
 
-_PART = 0.01  # step relative to the size of a number without a natural unit
-_SMALLEST = 1e-9  # smallest step, relative to the natural one; a limit closer to its physical end cannot move
-_TINY = 1e-9  # a smaller limit counts as 0, and its size as 1
-_LARGEST = {"rad": 0.2, "m": 0.05, "m/s": 0.2}
+_STEP_SHARE = 0.01  # step relative to the size of a number without a natural unit
+_MIN_SHARE = 1e-9  # smallest step, relative to the natural step; a limit closer to its physical end cannot move
+_ZERO_SIZE = 1e-9  # a smaller limit counts as 0, and then its size is 1
+_MAX_SHARES = {"rad": 0.2, "m": 0.05, "m/s": 0.2}
 """Unit → largest natural step, relative to the size of the moved number."""
 
-_NATURAL = {"rad": math.pi / 180, "m": 1e-2, "m/s": 1 / 3.6}
+_NATURAL_STEPS = {"rad": math.pi / 180, "m": 1e-2, "m/s": 1 / 3.6}
 """Unit → natural step."""
 
 
@@ -22,43 +22,48 @@ class LimitStep:
     """A change of a limit.
 
     Attributes:
-        size: positive, in the unit of the parameter.
-        text: in the unit in which the problem is written, e.g. ``1 deg``.
+        size: size of the step, positive, in the unit in which the parameter is stored.
+        text: the step in the unit in which the problem is written, e.g. ``1 deg``.
     """
 
     size: float
     text: str
 
 
-def natural_step(unit: Unit, kept: str, size: float) -> LimitStep:
-    """The natural step for a number of a size, such as the limit or the width of its range.
+def natural_step(unit: Unit, stored_unit: str, size: float) -> LimitStep:
+    """The natural step of a limit.
 
     Args:
-        unit: in which the problem is written.
-        kept: the unit in which the number is stored.
+        unit: the unit in which the problem is written.
+        stored_unit: the unit in which the number is stored.
+        size: a typical size of the number, such as the limit or the width of its range.
     """
-    return next(_steps(unit, kept, size))
+    return next(_list_steps(unit, stored_unit, size))
 
 
-def step_within(unit: Unit, kept: str, size: float, limit: float, direction: float, allowed: Range) -> LimitStep | None:
+def step_within(
+    unit: Unit, stored_unit: str, size: float, limit: float, direction: float, physical_range: Range
+) -> LimitStep | None:
     """The largest natural step that keeps the moved limit physical; None at a physical end."""
-    return next((step for step in _steps(unit, kept, size) if limit + direction * step.size in allowed), None)
+    return next(
+        (step for step in _list_steps(unit, stored_unit, size) if limit + direction * step.size in physical_range), None
+    )
 
 
-def _steps(unit: Unit, kept: str, size: float) -> Iterator[LimitStep]:
-    """Steps from the natural one down."""
-    size = abs(size) if abs(size) > _TINY else 1.0
-    largest = _one_two_five(_NATURAL.get(kept, _PART * size) / unit.one)
-    while kept in _NATURAL and largest * unit.one > _LARGEST[kept] * size:
+def _list_steps(unit: Unit, stored_unit: str, size: float) -> Iterator[LimitStep]:
+    """The natural step, and then smaller and smaller steps."""
+    size = abs(size) if abs(size) > _ZERO_SIZE else 1.0
+    largest = _round_to_1_2_5(_NATURAL_STEPS.get(stored_unit, _STEP_SHARE * size) / unit.one)
+    while stored_unit in _NATURAL_STEPS and largest * unit.one > _MAX_SHARES[stored_unit] * size:
         largest /= 10
     step = largest
-    while step >= _SMALLEST * largest:
+    while step >= _MIN_SHARE * largest:
         yield LimitStep(step * unit.one, unit.show(step * unit.one, 4))
-        step = _one_two_five(step / 2.2)
+        step = _round_to_1_2_5(step / 2.2)
 
 
-def _one_two_five(x: float) -> float:
-    """The number 1, 2 or 5 times a power of ten that is nearest to x by ratio."""
+def _round_to_1_2_5(x: float) -> float:
+    """The number 1, 2 or 5 times a power of ten whose ratio to x is nearest to 1."""
     decade = math.floor(math.log10(x))
     choices = [k * 10.0**d for d in (decade, decade + 1) for k in (1, 2, 5)]
     nearest = min(choices, key=lambda c: abs(math.log(c / x)))

@@ -1,4 +1,4 @@
-"""A solution in words: its structure, its quality, and warnings."""
+"""Describes a solution in words: its structure, its quality, and warnings."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.analysis.limits import is_physical
+from tmsopt.analysis.limits import is_physical, split_bound
 from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import describe_user_structure
 from tmsopt.problem.problem import Posed
@@ -14,10 +14,10 @@ from tmsopt.problem.quantities import ROOT_QUANTITIES
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import unit_of
 
-_ROOTS = {q.name for q in ROOT_QUANTITIES}
-_SHARES = (0.0, 0.29, 0.5, 0.83, 1.0)  # of a range: the points at which an effect is looked for
-_UNCHANGED = 1e-13  # relative: rounding of a few operations
-_AT = 1e-12  # relative distance to a bound that counts as touching it
+_ROOT_NAMES = {q.name for q in ROOT_QUANTITIES}
+_RANGE_SHARES = (0.0, 0.29, 0.5, 0.83, 1.0)  # shares of a range at which the effect of a parameter is evaluated
+_ROUNDING = 1e-13  # relative rounding error of a few operations
+_BOUND_DISTANCE = 1e-12  # largest relative distance to a bound for which the bound counts as reached
 
 
 def summarise(solution: Solution) -> str:
@@ -34,16 +34,16 @@ def summarise(solution: Solution) -> str:
 
 
 def list_warnings(solution: Solution) -> tuple[str, ...]:
-    """Active bounds that are arbitrary, bounds touched without a gain, parameters without effect."""
+    """Warnings about arbitrary active bounds, bounds reached without a gain, and parameters without effect."""
     if solution.status == "infeasible":
         return ()
     problem = solution.problem.posed
-    idle = {name: _idle_warning(solution, name) for name in problem.free}
+    idle = {name: _warn_of_idle_parameter(solution, name) for name in problem.free}
     return (
-        *_abscissa_warning(problem),
-        *_active_bound_warning(solution),
+        *_warn_of_abscissa_unit(problem),
+        *_warn_of_active_bounds(solution),
         *filter(None, idle.values()),
-        *(text for name in problem.free if not idle[name] for text in _touched_bound_warnings(solution, name)),
+        *(text for name in problem.free if not idle[name] for text in _warn_of_reached_bounds(solution, name)),
     )
 
 
@@ -53,7 +53,7 @@ def no_design(problem: Posed) -> str:
 
 
 def describe_better(solution: Solution, goal: str) -> str:
-    """The predicate of a sentence about a better design: that it decays faster, or has a smaller or larger goal."""
+    """The predicate of a sentence about a better design: it decays faster, or it has a smaller or larger goal."""
     problem, bound = solution.problem.posed, solution.bound
     by = f" by more than {bound.gap:.1e}" if bound.tolerance else ""
     if goal != "abscissa" or problem.sense == "maximize" or solution.stability.on_edge:
@@ -80,7 +80,7 @@ def _describe_quality(solution: Solution) -> str:
     return f"the {end} {goal} found is {unit_of(problem, goal).show(solution.value, 6)}, {sureness}"
 
 
-def _abscissa_warning(problem: Posed) -> Iterator[str]:
+def _warn_of_abscissa_unit(problem: Posed) -> Iterator[str]:
     """Warns that the unit of the abscissa depends on a free parameter."""
     free = [name for name in ("w", "g") if name in problem.free]
     if free and problem.parameter_set.root_unit == "√(g/w)" and "abscissa" in (problem.minimize or ""):
@@ -88,44 +88,43 @@ def _abscissa_warning(problem: Posed) -> Iterator[str]:
         yield f"the abscissa has the unit √(g/w), which varies with {' and '.join(free)}: {advice}"
 
 
-def _active_bound_warning(solution: Solution) -> Iterator[str]:
+def _warn_of_active_bounds(solution: Solution) -> Iterator[str]:
     """Active bounds that are not physical."""
     problem = solution.problem.posed
     bounds = (f"{name}.{end}" for name in problem.free for end in ("min", "max"))
     active = [bound for bound in bounds if bound in solution.active and bound not in problem.constraints]
     if arbitrary := [bound for bound in active if not is_physical(problem, bound)]:
-        listed = ", ".join(f"{bound} = {_describe_bound(problem, bound)}" for bound in arbitrary)
+        bounds_text = ", ".join(f"{bound} = {_describe_bound(problem, bound)}" for bound in arbitrary)
         advice = "widen the ends that are guesses, and state real limits under [constraints]"
-        yield f"the answer depends on these ends of ranges: {listed}; {advice}"
+        yield f"the answer depends on these ends of ranges: {bounds_text}; {advice}"
 
 
 def _describe_bound(problem: Posed, bound: str) -> str:
-    name, end = bound.rsplit(".", 1)
-    return unit_of(problem, name).show(problem.free[name][end == "max"], 10)
+    return unit_of(problem, bound).show(split_bound(problem, bound)[2], 10)
 
 
-def _touched_bound_warnings(solution: Solution, name: str) -> Iterator[str]:
+def _warn_of_reached_bounds(solution: Solution, name: str) -> Iterator[str]:
     problem, x = solution.problem.posed, solution.parameters[name]
     for end, limit in zip(("min", "max"), problem.free[name], strict=True):
         bound = f"{name}.{end}"
-        if bound not in solution.active and abs(x - limit) <= _AT * max(abs(limit), _AT):
-            why = "to first order, relaxing it improves nothing" if problem.objective else "nothing was optimised"
-            yield f"{name} is at {bound} = {_describe_bound(problem, bound)}; {why}"
+        if bound not in solution.active and abs(x - limit) <= _BOUND_DISTANCE * max(abs(limit), _BOUND_DISTANCE):
+            reason = "to first order, relaxing it improves nothing" if problem.objective else "nothing was optimised"
+            yield f"{name} is at {bound} = {_describe_bound(problem, bound)}; {reason}"
 
 
-def _idle_warning(solution: Solution, name: str) -> str:
-    """A warning for a parameter without effect on goal and limits; empty for one with an effect."""
+def _warn_of_idle_parameter(solution: Solution, name: str) -> str:
+    """A warning if a parameter has no effect on goal and limits; empty if it has an effect."""
     problem = solution.problem.posed
     lower, upper = problem.free[name]
-    points = [solution.parameters[name], *(lower + share * (upper - lower) for share in _SHARES)]
+    points = [solution.parameters[name], *(lower + share * (upper - lower) for share in _RANGE_SHARES)]
     conditions = problem.conditions
     expressions: dict[Any, Expression] = {**conditions, **({None: problem.objective} if problem.objective else {})}
-    rows = [_signature(problem, {**solution.parameters, name: x}, expressions.values()) for x in points]
+    rows = [_evaluate_signature(problem, {**solution.parameters, name: x}, expressions.values()) for x in points]
     roots_move = _is_varying([monic for monic, _ in rows])
     affected = [
         n
         for k, (n, e) in enumerate(expressions.items())
-        if _is_varying([[values[k]] for _, values in rows]) or (roots_move and not _ROOTS.isdisjoint(e.names))
+        if _is_varying([[values[k]] for _, values in rows]) or (roots_move and not _ROOT_NAMES.isdisjoint(e.names))
     ]
     if (problem.locate and roots_move) or None in affected:
         return ""
@@ -133,17 +132,17 @@ def _idle_warning(solution: Solution, name: str) -> str:
         return ""  # it moves the optimum through an active constraint
     goals = " and ".join(filter(None, (problem.locate, problem.goal)))
     ends = " to ".join(_describe_bound(problem, f"{name}.{end}") for end in ("min", "max"))
-    kept = f" that satisfies {', '.join(affected)}" if affected else ""
-    return f"{name} has no effect on {goals} here: any value from {ends}{kept} works"
+    condition = f" that satisfies {', '.join(affected)}" if affected else ""
+    return f"{name} has no effect on {goals} here: any value from {ends}{condition} works"
 
 
-def _signature(
+def _evaluate_signature(
     problem: Posed, parameters: dict[str, float], expressions: Iterable[Expression]
 ) -> tuple[list[float], list[float]]:
-    """Monic coefficients, and the values of expressions at fixed root quantities."""
+    """Monic coefficients, and the values of expressions with fixed root quantities."""
     values = problem.values(problem.ordered(parameters))
     a = np.array([float(c) for c in values.coefficients])
-    values = values.with_known(dict.fromkeys(_ROOTS, 0.5))
+    values = values.with_known(dict.fromkeys(_ROOT_NAMES, 0.5))
     with np.errstate(all="ignore"):
         return list(a / a[0]), [float(e(values)) for e in expressions]
 
@@ -153,4 +152,4 @@ def _is_varying(rows: list[list[float]]) -> bool:
     table = np.array(rows)
     if not np.all(np.isfinite(table)):
         return True
-    return bool(np.any(np.ptp(table, axis=0) > _UNCHANGED * np.abs(table).max()))
+    return bool(np.any(np.ptp(table, axis=0) > _ROUNDING * np.abs(table).max()))

@@ -1,7 +1,7 @@
 """Dynamics of a design: critical speeds, growth rates over speed, and motion after a push.
 
-In: a design, and a parameter that varies or a disturbance. Out: `Speeds` and `Growth`, which miss no critical speed,
-and a `Simulation`. Open `speeds` first, then `simulate`.
+Input: a design, and a parameter that varies or a disturbance. Output: `Speeds` and `Growth`, which miss no critical
+speed, and a `Simulation`. Open `speeds` first, then `simulate`.
 """
 
 import lazy_loader

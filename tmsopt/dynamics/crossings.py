@@ -1,9 +1,9 @@
-"""All values of y at which roots of a polynomial in s meet or cross the imaginary axis, exactly.
+"""Finds all values of y at which roots of a polynomial in s meet or cross the imaginary axis, exactly.
 
-The coefficients are rational polynomials in y. A root 0, a root at infinity, a pair ± iω and a multiple root occur at
-roots of polynomials in y: of aₙ, of a0, of the resultant of the even and the odd part, and of the discriminant. Ball
-arithmetic isolates these roots, so none is missed, however close to another. Factors that are present for every y,
-such as a root 0, are split off first.
+The coefficients are polynomials in y with rational coefficients. A root 0 occurs where aₙ(y) = 0, a root at infinity
+where a0(y) = 0, a pair ± iω where the resultant of the even and the odd part is 0, and a multiple root where the
+discriminant is 0. Interval arithmetic isolates the roots y of these polynomials. So no y is missed, even if it is very
+close to another one. Factors that are present for every y, such as a root 0, are split off first.
 """
 
 import math
@@ -25,15 +25,15 @@ Polynomial = Sequence[Any]
 """Coefficients in y, exact fractions, ascending."""
 
 DIGITS = 120
-"""Decimal digits of y; a k-fold root then scatters by 10^(−120/k)."""
+"""Decimal digits of y. The rounding errors of y move a k-fold root by 10^(−120/k)."""
 
 _RING = flint.fmpq_mpoly_ctx.get(["s", "y"], "lex")
 _S, _Y = _RING.gens()
-_SAME = 1e-12  # distance, relative to the largest root, below which two roots count as one
-_NOTHING = flint.fmpq(1, 10**90)  # coefficient, relative to the largest, that counts as 0
+_SAME_ROOT = 1e-12  # distance, relative to the largest root, below which two roots count as one
+_ZERO_COEFFICIENT = flint.fmpq(1, 10**90)  # largest coefficient, relative to the largest of all, that counts as 0
 
 Stretch = tuple[float, float]
-"""Two ends of a band."""
+"""The two ends of a band of values."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,12 @@ class Crossing:
     """A value of y at which roots meet or cross the imaginary axis.
 
     Attributes:
-        at: y.
+        at: the value of y.
         kind: ``capsize`` (a root 0), ``weave`` (a pair ± iω), ``infinity`` (a root at infinity), ``EP2``, ``EP3``, …
             (a real k-fold root) or ``CEP2``, … (a k-fold pair).
-        root: the root with its multiplicity, or the upper one of a pair; meaningless for ``infinity``.
-        rightmost: whether no other root is further right.
-        changes: whether the polynomial is stable, or marginally stable, on exactly one side.
+        root: the root with its multiplicity, or the upper root of a pair; meaningless for ``infinity``.
+        rightmost: whether no other root is farther to the right.
+        changes: whether the polynomial is stable, or marginally stable, on exactly one side of y.
     """
 
     at: float
@@ -61,13 +61,13 @@ class Crossings:
     """All crossings in a range of y.
 
     Attributes:
-        found: in ascending order.
+        found: the crossings, in ascending order of y.
         stable: bands with all Re s < 0, cut off at the ends of the range.
         heavily_damped: bands with all s real and negative.
-        always: kinds present for every y: ``weave`` (roots mirrored in the axis), ``EP2`` (a multiple root other than
-            0), ``capsize`` (a root 0), ``infinity``.
+        always: the kinds that are present for every y: ``weave`` (roots mirrored in the axis), ``EP2`` (a multiple root
+            other than 0), ``capsize`` (a root 0), ``infinity``.
         marginal: bands with no root right of the axis and simple roots on it, apart from a root 0 that is present for
-            every y. Empty if `always` is.
+            every y. Empty if `always` is empty.
         zeros: multiplicity of the root 0 that is present for every y.
     """
 
@@ -79,53 +79,56 @@ class Crossings:
     zeros: int = 0
 
 
-def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, bands_alone: bool = False) -> Crossings:
+def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, bands_only: bool = False) -> Crossings:
     """All crossings with lower < y < upper, in exact numbers; upper may be inf.
 
     Args:
         coefficients: coefficients of the polynomial in s, descending, each a polynomial in y.
-        bands_alone: skip the crossings themselves, which take most of the time.
+        bands_only: compute only the bands, because the crossings take most of the time.
     """
     lower, upper = rational(lower), None if upper == math.inf else rational(upper)
-    p = _bivariate([flint.fmpq_poly([*map(rational, c)]) for c in reversed(coefficients)])
-    a, split = _rows(p), _split_factors(p)
+    p = _join_rows([flint.fmpq_poly([*map(rational, c)]) for c in reversed(coefficients)])
+    a, split = _split_rows(p), _split_factors(p)
     places = {
         kind: _isolate_real_roots(q, lower, upper)
-        for kind, q in _event_polynomials(a, split).items()
+        for kind, q in _list_event_polynomials(a, split).items()
         if not q.is_zero()
     }
     marks = sorted({y for ys in places.values() for y in ys})
-    cells = list(_cells(marks, lower, upper))
+    cells = list(_list_cells(marks, lower, upper))
     stable, damped = zip(*(_classify(_evaluate_at(a, middle)) for _, _, middle in cells), strict=True)
-    lasting = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
-    marginal = [any(lasting.values()) and _is_marginal(split, middle) for _, _, middle in cells]
-    kept = [held or on for held, on in zip(stable, marginal, strict=True)]
-    changed = {float(y): kept[k] != kept[k + 1] for k, y in enumerate(marks)}
-    always = {"infinity": len(a) < len(coefficients)} | lasting
-    named = {} if bands_alone else places
-    here = (
-        (y, each) for y in marks for kind, ys in named.items() if y in ys for each in _find_events(a, split, kind, y)
+    permanent = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
+    marginal = [any(permanent.values()) and _is_marginal(split, middle) for _, _, middle in cells]
+    is_bounded = [is_stable or is_marginal for is_stable, is_marginal in zip(stable, marginal, strict=True)]
+    changed = {float(y): is_bounded[k] != is_bounded[k + 1] for k, y in enumerate(marks)}
+    always = {"infinity": len(a) < len(coefficients)} | permanent
+    found = (
+        Crossing(float(y), *event, changed[float(y)])
+        for y in marks
+        for kind, values in places.items()
+        if y in values
+        for event in _find_events(a, split, kind, y)
     )
     return Crossings(
-        tuple(Crossing(float(y), *each, changed[float(y)]) for y, each in here),
-        _bands(cells, stable),
-        _bands(cells, damped),
+        () if bands_only else tuple(found),
+        _merge_bands(cells, stable),
+        _merge_bands(cells, damped),
         tuple(kind for kind, holds in always.items() if holds),
-        _bands(cells, marginal),
+        _merge_bands(cells, marginal),
         split.zeros,
     )
 
 
-def user_crossings(model: Model, found: Crossings) -> Crossings:
-    """Crossings in the user's terms: for a complex system those of its eigenfrequencies."""
+def user_crossings(model: Model, crossings: Crossings) -> Crossings:
+    """The crossings as the user sees them. For a complex system, they are crossings of its eigenfrequencies."""
     if model.carrier is None:
-        return found
-    own = tuple(
+        return crossings
+    user_found = tuple(
         replace(c, kind=user_structure_name(model, c.kind), root=user_roots(model, [replace(c.root, im=-c.root.im)])[0])
-        for c in found.found
+        for c in crossings.found
         if c.kind not in ("capsize", "infinity")
     )
-    return replace(found, found=own, heavily_damped=())
+    return replace(crossings, found=user_found, heavily_damped=())
 
 
 @dataclass(frozen=True)
@@ -135,16 +138,16 @@ class _Split:
     Attributes:
         zeros: multiplicity of the root 0 for every y.
         mirrored: product of the distinct factors that are even in s, with roots s and −s.
-        rest: product of the other distinct factors.
-        once: s (if it divides p) times mirrored times rest: p without repeated factors.
+        other_factors: product of the other distinct factors.
+        squarefree: p without repeated factors: mirrored times other_factors, times s if s divides p.
         repeated: whether a factor other than s is repeated.
         repeats_mirrored: whether an even factor is repeated.
     """
 
     zeros: int
     mirrored: list[Any]
-    rest: list[Any]
-    once: list[Any]
+    other_factors: list[Any]
+    squarefree: list[Any]
     repeated: bool
     repeats_mirrored: bool
 
@@ -156,28 +159,35 @@ def _split_factors(p: Any) -> _Split:
     once = math.prod((f for f, _ in factors), start=_S**0)
     mirrored = once.gcd(once.compose(-_S, _Y))
     repeats_mirrored = p.gcd(p.compose(-_S, _Y)).degrees()[0] > mirrored.degrees()[0]
-    rest, single = _rows(once / mirrored), _rows(once * _S if zeros else once)
-    return _Split(zeros, _rows(mirrored), rest, single, any(times > 1 for _, times in factors), repeats_mirrored)
+    other_factors, squarefree = _split_rows(once / mirrored), _split_rows(once * _S if zeros else once)
+    return _Split(
+        zeros,
+        _split_rows(mirrored),
+        other_factors,
+        squarefree,
+        any(times > 1 for _, times in factors),
+        repeats_mirrored,
+    )
 
 
-def _event_polynomials(a: Sequence[Any], split: _Split) -> dict[str, Any]:
+def _list_event_polynomials(a: Sequence[Any], split: _Split) -> dict[str, Any]:
     """Polynomials in y whose roots are the crossings of each kind."""
-    even, odd = (_bivariate(split.rest[::-1][k::2]) for k in (0, 1))
-    once = _bivariate(split.once[::-1])
+    even, odd = (_join_rows(split.other_factors[::-1][k::2]) for k in (0, 1))
+    once = _join_rows(split.squarefree[::-1])
     return {
-        "capsize": split.mirrored[-1] * split.rest[-1],
+        "capsize": split.mirrored[-1] * split.other_factors[-1],
         "infinity": a[0],
-        "weave": _rows(even.resultant(odd, "s"))[0] if len(split.rest) > 1 else flint.fmpq_poly(),
-        "EP2": _rows(once.discriminant("s"))[0] if len(split.once) > 1 else flint.fmpq_poly(),
+        "weave": _split_rows(even.resultant(odd, "s"))[0] if len(split.other_factors) > 1 else flint.fmpq_poly(),
+        "EP2": _split_rows(once.discriminant("s"))[0] if len(split.squarefree) > 1 else flint.fmpq_poly(),
     }
 
 
-def _bivariate(rows: Sequence[Any]) -> Any:
+def _join_rows(rows: Sequence[Any]) -> Any:
     """A polynomial in s and y from its coefficients, ascending in s."""
     return _RING.from_dict({(i, j): x for i, row in enumerate(rows) for j, x in enumerate(row.coeffs())})
 
 
-def _rows(p: Any) -> list[Any]:
+def _split_rows(p: Any) -> list[Any]:
     """Coefficients of a polynomial in s and y, descending in s, as polynomials in y."""
     rows = [flint.fmpq_poly() for _ in range(p.degrees()[0] + 1)]
     for (i, j), value in p.to_dict().items():
@@ -197,47 +207,49 @@ def _isolate_real_roots(polynomial: Any, lower: Any, upper: Any | None) -> list[
 
 
 def _is_marginal(split: _Split, y: Any) -> bool:
-    """Whether no root is right of the axis and those on it are simple, apart from roots 0."""
-    rest, mirrored = _evaluate_at(split.rest, y), _evaluate_at(split.mirrored, y)
-    if split.repeats_mirrored or not _classify(rest)[0]:
+    """Whether no root is right of the axis and all roots on the axis are simple, apart from roots 0."""
+    others, mirrored = _evaluate_at(split.other_factors, y), _evaluate_at(split.mirrored, y)
+    if split.repeats_mirrored or not _classify(others)[0]:
         return False
     return all(w.im == 0 and w.re < 0 for w in exact_roots(mirrored[::2]))  # in w = s²
 
 
 def _find_events(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:
-    """Kind, root and whether it is rightmost, for each crossing at y; a mirrored real pair is none."""
+    """Kind, root and whether the root is rightmost, for each crossing at y. A mirrored real pair is no crossing."""
     if kind == "infinity":
         yield kind, Root(math.nan, 0.0), False
         return
-    coefficients = _finite_part(_evaluate_at(a, y))
-    size = _root_bound(a, y, coefficients)
+    coefficients = _strip_leading_zeros(_evaluate_at(a, y))
+    size = _bound_roots(a, y, coefficients)
     roots = _cluster_roots(coefficients, size)
     line = max((r.re for r in roots), default=math.nan)
 
     def count_roots(part: Sequence[Any], root: Root) -> int:
         """Multiplicity of a root in a factor."""
-        own = _cluster_roots(_finite_part(_evaluate_at(part, y)), size)
-        return sum(o.multiplicity for o in own if abs(complex(o.re - root.re, o.im - root.im)) <= _SAME * size)
+        part_roots = _cluster_roots(_strip_leading_zeros(_evaluate_at(part, y)), size)
+        return sum(
+            o.multiplicity for o in part_roots if abs(complex(o.re - root.re, o.im - root.im)) <= _SAME_ROOT * size
+        )
 
     holds: dict[str, Callable[[Root], bool]] = {
         "capsize": lambda r: r.re == r.im == 0,
-        "weave": lambda r: r.re == 0 < r.im and count_roots(split.rest, r) > 0,
-        "EP2": lambda r: r.multiplicity > 1 and r.im >= 0 and count_roots(split.once, r) > 1,
+        "weave": lambda r: r.re == 0 < r.im and count_roots(split.other_factors, r) > 0,
+        "EP2": lambda r: r.multiplicity > 1 and r.im >= 0 and count_roots(split.squarefree, r) > 1,
     }
     for root in filter(holds[kind], roots):
         name = f"{'CEP' if root.im else 'EP'}{root.multiplicity}" if kind == "EP2" else kind
-        yield name, root, root.re >= line - _SAME * size
+        yield name, root, root.re >= line - _SAME_ROOT * size
 
 
-def _finite_part(coefficients: Sequence[Any]) -> Sequence[Any]:
+def _strip_leading_zeros(coefficients: Sequence[Any]) -> Sequence[Any]:
     """The coefficients without leading zeros (within the digits of y), whose roots are at infinity."""
     largest = max(abs(c) for c in coefficients)
-    first = next((k for k, c in enumerate(coefficients) if abs(c) > _NOTHING * largest), len(coefficients) - 1)
+    first = next((k for k, c in enumerate(coefficients) if abs(c) > _ZERO_COEFFICIENT * largest), len(coefficients) - 1)
     return coefficients[first:]
 
 
-def _root_bound(a: Sequence[Any], y: Any, coefficients: Sequence[Any]) -> float:
-    """A bound on the roots from the terms in y, which do not cancel, so it is positive even if all roots are 0."""
+def _bound_roots(a: Sequence[Any], y: Any, coefficients: Sequence[Any]) -> float:
+    """A bound on the size of the roots. Terms in y do not cancel, so it is positive even if all roots are 0."""
     terms = [flint.fmpq_poly([*map(abs, c.coeffs())])(abs(y)) for c in a[len(a) - len(coefficients) :]]
     lead = abs(coefficients[0])
     ratios = ((k, t / lead) for k, t in enumerate(terms) if k and t != 0)
@@ -245,15 +257,15 @@ def _root_bound(a: Sequence[Any], y: Any, coefficients: Sequence[Any]) -> float:
 
 
 def _cluster_roots(coefficients: Sequence[Any], size: float) -> list[Root]:
-    """Roots of a polynomial with `DIGITS` digits; scattered ones are merged into a multiple root."""
-    left = list(exact_roots(coefficients, DIGITS)) if len(coefficients) > 1 else []
+    """Roots of a polynomial with `DIGITS` digits; roots that rounding separates are merged into a multiple root."""
+    remaining_roots = list(exact_roots(coefficients, DIGITS)) if len(coefficients) > 1 else []
     groups: list[Root] = []
-    while left:
-        z = complex(left[0].re, left[0].im)
-        near = [r for r in left if abs(complex(r.re, r.im) - z) <= _SAME * size]
-        left = [r for r in left if r not in near]
-        re, im = (x if abs(x) > _SAME * size else 0.0 for x in (z.real, z.imag))
-        groups.append(Root(re, im, sum(r.multiplicity for r in near)))
+    while remaining_roots:
+        z = complex(remaining_roots[0].re, remaining_roots[0].im)
+        near_roots = [r for r in remaining_roots if abs(complex(r.re, r.im) - z) <= _SAME_ROOT * size]
+        remaining_roots = [r for r in remaining_roots if r not in near_roots]
+        re, im = (x if abs(x) > _SAME_ROOT * size else 0.0 for x in (z.real, z.imag))
+        groups.append(Root(re, im, sum(r.multiplicity for r in near_roots)))
     return groups
 
 
@@ -265,8 +277,8 @@ def _classify(coefficients: Sequence[Any]) -> tuple[bool, bool]:
     return True, all(r.im == 0 for r in exact_roots(coefficients))
 
 
-def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tuple[float, float, Any]]:
-    """Gaps between marks: both ends, and a number between them."""
+def _list_cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tuple[float, float, Any]]:
+    """The intervals between marks: both ends, and a number between them."""
     for low, high in pairwise([lower, *marks, upper]):
         if high is None:
             yield float(low), math.inf, low + 1 + abs(low)
@@ -274,10 +286,10 @@ def _cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tupl
             yield float(low), float(high), (low + high) / 2
 
 
-def _bands(cells: Sequence[tuple[float, float, Any]], inside: Sequence[bool]) -> tuple[Stretch, ...]:
-    """Gaps that are inside, with adjacent ones merged even if the single point between them is not inside."""
+def _merge_bands(cells: Sequence[tuple[float, float, Any]], is_inside: Sequence[bool]) -> tuple[Stretch, ...]:
+    """The intervals that are inside. Adjacent ones are merged, even if the single point between them is not inside."""
     bands: list[Stretch] = []
-    for (low, high, _), holds in zip(cells, inside, strict=True):
+    for (low, high, _), holds in zip(cells, is_inside, strict=True):
         if holds and bands and bands[-1][1] == low:
             bands[-1] = (bands[-1][0], high)
         elif holds:

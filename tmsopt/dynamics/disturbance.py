@@ -1,4 +1,4 @@
-"""The disturbance that sets a design moving, as the user states it and as a state of its system."""
+"""The disturbance that starts the motion of a design, as the user states it and as a state of the system."""
 
 import math
 from collections.abc import Mapping
@@ -13,9 +13,10 @@ from tmsopt.problem.units import parse_quantity
 from tmsopt.records import Array, Table, plain
 
 MOST_POINTS = 1_000_000
+"""Most points of a simulation."""
 
-_LEAN = math.pi / 180  # default
-_ANGLED = dict(zip(("lean", "steer"), ANGLES, strict=True))
+_DEFAULT_LEAN = math.pi / 180  # lean at the start if the user states no disturbance
+_ANGLE_NAMES = dict(zip(("lean", "steer"), ANGLES, strict=True))
 _IMPULSES = {"push": "T_delta", "lean_push": "T_phi"}
 _AMOUNTS = (*_IMPULSES, "noise")
 
@@ -25,7 +26,7 @@ class Disturbance:
     """A disturbance of a design.
 
     Attributes:
-        start: states at the start, before any push, in rad and s; missing ones are 0.
+        start: states at the start, before any push, in rad and s; states that are missing are 0.
         push, lean_push: impulses of steer torque and lean torque at t = 0.
         noise: intensity of the white noise on the steer torque.
         seed: seed of the noise.
@@ -40,7 +41,7 @@ class Disturbance:
     default: bool = False
 
     def state(self, system: System) -> Array:
-        """The state immediately after it; yaw and lateral displacement are 0."""
+        """The state immediately after the disturbance; yaw and lateral displacement are 0."""
         x = np.zeros(len(system.A))
         x[: len(system.names)] = [self.start.get(name, 0.0) for name in system.names]
         for name, torque in _IMPULSES.items():
@@ -53,20 +54,20 @@ class Disturbance:
         return plain(self, "start push lean_push default") | (plain(self, "noise seed") if self.noise else {})
 
 
-def parse_disturbance(system: System, given: Mapping[str, Any]) -> Disturbance:
+def parse_disturbance(system: System, arguments: Mapping[str, Any]) -> Disturbance:
     """The disturbance that the arguments of `simulate` state.
 
     Args:
-        given: the arguments by name.
+        arguments: name of each argument of `simulate` → its value.
 
     Raises:
         InputError: with all faults of the arguments.
     """
-    start, faults = _parse_angles(system, given)
-    stated = {} if given["start"] is None else given["start"]
-    wrong = table_faults("start", stated, f"{{'{system.names[-1]}': 0.1}}")
+    start, faults = _parse_angles(system, arguments)
+    states = {} if arguments["start"] is None else arguments["start"]
+    wrong = table_faults("start", states, f"{{'{system.names[-1]}': 0.1}}")
     faults += wrong
-    for name, value in () if wrong else stated.items():
+    for name, value in () if wrong else states.items():
         if name not in system.names:
             faults.append(Fault(f"unknown state '{name}'; {suggest(name, system.names)}", ("start",)))
         elif not is_number(value):
@@ -75,37 +76,40 @@ def parse_disturbance(system: System, given: Mapping[str, Any]) -> Disturbance:
             faults.append(Fault("is given twice, in degrees and in rad; give it once", ("start", name)))
         else:
             start[name] = float(value)
-    seconds = given["seconds"]
+    seconds = arguments["seconds"]
     if seconds is not None and not (is_number(seconds) and seconds > 0):
         faults.append(Fault(f"found {short(seconds)}; accepted: a number above 0", ("seconds",)))
-    faults += [*count_faults("points", given["points"], 2, MOST_POINTS), *count_faults("seed", given["seed"], 0)]
+    faults += [
+        *count_faults("points", arguments["points"], 2, MOST_POINTS),
+        *count_faults("seed", arguments["seed"], 0),
+    ]
     if faults:
         raise InputError(faults)
-    nothing = not start and all(given[name] is None for name in _AMOUNTS)
+    nothing = not start and all(arguments[name] is None for name in _AMOUNTS)
     if nothing:
-        start = {system.coordinates[0]: _LEAN if system.impulses else 1.0}
-    amounts = {name: float(given[name] or 0.0) for name in _AMOUNTS}
-    return Disturbance(Table(start), **amounts, seed=int(given["seed"]), default=nothing)
+        start = {system.coordinates[0]: _DEFAULT_LEAN if system.impulses else 1.0}
+    amounts = {name: float(arguments[name] or 0.0) for name in _AMOUNTS}
+    return Disturbance(Table(start), **amounts, seed=int(arguments["seed"]), default=nothing)
 
 
-def _parse_angles(system: System, given: Mapping[str, Any]) -> tuple[dict[str, float], list[Fault]]:
-    """The angles at the start, and faults of these angles and of the amounts of pushes and noise."""
+def _parse_angles(system: System, arguments: Mapping[str, Any]) -> tuple[dict[str, float], list[Fault]]:
+    """The angles at the start, and the faults of the angles, pushes and noise."""
     faults, start = list[Fault](), dict[str, float]()
-    for word, value in ((w, given[w]) for w in (*_ANGLED, *_AMOUNTS) if given[w] is not None):
+    for word, value in ((w, arguments[w]) for w in (*_ANGLE_NAMES, *_AMOUNTS) if arguments[w] is not None):
         if not system.impulses:
             example = ", ".join(f"{n}=1" for n in system.names[-1:])
             message = f"a stated system has no lean and no steer; give its initial state, start (--start) {example}"
             faults.append(Fault(message, (word,)))
-        elif word in _ANGLED and isinstance(value, str):
+        elif word in _ANGLE_NAMES and isinstance(value, str):
             try:
-                start[_ANGLED[word]] = parse_quantity(value, "rad")
+                start[_ANGLE_NAMES[word]] = parse_quantity(value, "rad")
             except ValueError as error:
                 text = str(error).replace("a number without quotes in rad", "a number without quotes in degrees")
                 faults.append(Fault(text, (word,)))
         elif not is_number(value):
             faults.append(Fault(f"found {short(value)}; accepted: a number", (word,)))
-        elif word in _ANGLED:
-            start[_ANGLED[word]] = math.radians(value)
+        elif word in _ANGLE_NAMES:
+            start[_ANGLE_NAMES[word]] = math.radians(value)
         elif word == "noise" and value < 0:
             faults.append(Fault(f"found {value:.6g}; accepted: 0 or more", (word,)))
     return start, faults

@@ -1,4 +1,4 @@
-"""Solutions of x′ = A x by matrix exponentials, which need no eigenvectors and are smooth at exceptional points."""
+"""Solves x′ = A x by matrix exponentials, which need no eigenvectors and are smooth at exceptional points."""
 
 import math
 from itertools import accumulate
@@ -11,30 +11,31 @@ from tmsopt.records import Array
 
 def sample_motion(A: Array, x: Array, step: float, count: int) -> Array:
     """e^(A k h) x for k = 0 … count − 1, shape (count, n), by one exponential and its squares."""
-    found = np.asarray(x, dtype=float)[None]
+    states = np.asarray(x, dtype=float)[None]
     power = expm(A * step)
-    while len(found) < count:
-        found = np.concatenate([found, found @ power.T])
+    while len(states) < count:
+        states = np.concatenate([states, states @ power.T])
         power = power @ power
-    return found[:count]
+    return states[:count]
 
 
 def evaluate_motion(A: Array, x: Array, times: Array) -> Array:
-    """e^(A t) x at a few arbitrary times, shape (len(times), n)."""
-    found: Array = expm(A * np.asarray(times)[:, None, None]) @ x
-    return found
+    """e^(A t) x at a few times of any spacing, shape (len(times), n)."""
+    states: Array = expm(A * np.asarray(times)[:, None, None]) @ x
+    return states
 
 
 def simulate_noise(A: Array, x: Array, force: Array, step: float, count: int, seed: int) -> Array:
-    """A path of dx = A x dt + b dW at the times k h, with b = `force`; each step is exact, however long.
+    """A random path of dx = A x dt + b dW at the times k h, with b = `force`; steps h of any length are exact.
 
-    The covariance Q(h) = ∫ e^(As) b bᵀ e^(Aᵀs) ds from 0 to h is a block of one exponential (Van Loan 1978). It is
-    computed for a fraction of the step in which e^(−As) does not grow, then Q(2s) = Q(s) + e^(As) Q(s) e^(Aᵀs).
+    The covariance Q(h) = ∫ e^(As) b bᵀ e^(Aᵀs) ds from 0 to h is a block of one matrix exponential (Van Loan 1978). It
+    is computed for a fraction of the step in which e^(−As) does not grow, and then doubled repeatedly by
+    Q(2s) = Q(s) + e^(As) Q(s) e^(Aᵀs).
     """
     n = len(A)
     halvings = max(0, math.ceil(math.log2(np.linalg.norm(A, 2) * step + 1e-300)))
-    whole = np.block([[-A, np.outer(force, force)], [np.zeros((n, n)), A.T]])
-    power = expm(whole * (step / 2**halvings))
+    matrix = np.block([[-A, np.outer(force, force)], [np.zeros((n, n)), A.T]])
+    power = expm(matrix * (step / 2**halvings))
     forward = power[n:, n:].T
     covariance = forward @ power[:n, n:]
     for _ in range(halvings):

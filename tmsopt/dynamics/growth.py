@@ -26,12 +26,12 @@ from tmsopt.search.solve import solve_if_needed
 SPEEDS = ("Fr", "v")
 """Parameters that are speeds."""
 
-_BICYCLE = 4  # degree of a bicycle whose modes have names
-_POINTS = 801
-_HALVINGS = 60  # of a step of the grid, down to rounding
-_CROWD = np.linspace(-1, 1, 301) ** 5
-_MARGIN = 1.25  # end of the range relative to the last event
-_FAR = 3  # farthest meeting of roots that is shown, relative to the design and the last axis crossing
+_BICYCLE_DEGREE = 4  # degree of a bicycle whose modes have names
+_GRID_POINTS = 801  # evenly spaced points
+_HALVINGS = 60  # halvings of a step of the grid, until only rounding errors remain
+_DENSE_OFFSETS = np.linspace(-1, 1, 301) ** 5  # of points around a meeting of roots, in widths of the range
+_END_RATIO = 1.25  # end of the range relative to the last event
+_FAR_RATIO = 3  # farthest meeting of roots that is shown, relative to the design and the last axis crossing
 
 
 @dataclass(frozen=True, repr=False)
@@ -40,20 +40,22 @@ class Growth(Tabular):
 
     Attributes:
         over: the parameter.
-        values: its values, ascending, shape (n,).
-        roots: shape (n, degree); for a complex H s = −i ω, shape (n, size of H). Columns are not modes, because modes
-            are not distinct at an exceptional point.
-        critical: critical value known to the model, such as Fr_c; nan without one.
-        design: value of the design.
-        structure: structure of its rightmost roots.
-        stable, heavily_damped: bands of values with all Re s < 0, and with all s real and negative. Exact where the
-            coefficients are polynomials in the parameter; else `stable` by bisection, and the other from the grid.
-        problem: the problem that the design solves; `over`, if one of its parameters, has the unit of its file.
-        modes: the roots again, as named modes between the places where roots meet.
-        events: values at which roots cross the axis or meet, exact; where the coefficients are no polynomials in
-            `over`, only changes of stability.
+        values: values of the parameter, ascending, shape (n,).
+        roots: shape (n, degree). For a complex H, s = −i ω, and the shape is (n, size of H). Columns are not modes,
+            because modes are not distinct at an exceptional point.
+        critical: critical value that the model knows, such as Fr_c; nan without a critical value.
+        design: value of the parameter at the design.
+        structure: structure of the rightmost roots of the design.
+        stable, heavily_damped: bands of values with all Re s < 0, and with all s real and negative. They are exact if
+            the coefficients are polynomials in the parameter. Otherwise `stable` is found by bisection, and
+            `heavily_damped` from the grid.
+        problem: the problem that the design solves. If `over` is a parameter of the problem, it has the unit of the
+            problem file.
+        modes: the same roots as named modes; a mode ends where roots meet.
+        events: exact values at which roots cross the axis or meet. If the coefficients are not polynomials in `over`,
+            only changes of stability are listed.
         rate: the unit of rates in 1/s, for each value; None without a unit of time.
-        multiple: multiple roots of the design, which its doubles give to half of their digits at most.
+        multiple: multiple roots of the design. Double precision gives them to half of its digits at most.
 
     Example:
         >>> bands = tmsopt.growth("problems/whipple_benchmark.toml").stable
@@ -78,7 +80,7 @@ class Growth(Tabular):
     multiple: tuple[Root, ...] = ()
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """The roots, one row per value."""
+        """The roots, one row for each value of the parameter."""
         names = [f"{part}_{k}" for k in range(1, self.roots.shape[1] + 1) for part in ("re", "im")]
         parts = np.stack([self.roots.real, self.roots.imag], axis=-1).reshape(len(self.values), -1)
         for value, row in zip(self.values.tolist(), parts.tolist(), strict=True):
@@ -94,16 +96,17 @@ class Growth(Tabular):
 def growth(
     design: Given, end: float | None = None, over: str | None = None, *, progress: Listener | None = None
 ) -> Growth:
-    """Roots over one parameter, with all others as in the design.
+    """Roots over one parameter; all other parameters are those of the design.
 
-    Points are dense around the design and where roots meet, because roots move there like a fractional power.
+    Points are dense around the design and where roots meet, because roots move fast there, by a fractional power.
 
     Args:
         design: a solution, or a problem or its file, which is solved first.
-        end: end of a range that begins at 0. The default for a speed is a little beyond the last weave, capsize or
-            meeting of roots (a meeting 3 times farther than all else is left out). The default for another parameter
-            is its range if it is free, else twice the design's value.
-        over: a parameter of the problem or a native one; by default the speed, or else the first free one.
+        end: end of a range that begins at 0. The default for a speed is a little larger than the last weave speed,
+            capsize speed or speed at which roots meet. A meeting of roots at more than 3 times the other speeds is left
+            out. The default for another parameter is its range if it is free, otherwise twice the design's value.
+        over: a parameter of the problem, or a native parameter of the model. The default is the speed, or without a
+            speed the first free parameter.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
@@ -123,10 +126,11 @@ def growth(
         raise input_error(f"found {short(end)}; accepted: a number other than 0", "end")
     parameter_set, parameters, name = _find_parameter(design, over)
     model = design.problem.model
-    known = f"{name}_c" in model.quantity_names(parameter_set)
-    at, critical = parameters[name], float(Values(model, parameter_set, parameters)[f"{name}_c"]) if known else math.nan
+    has_critical = f"{name}_c" in model.quantity_names(parameter_set)
+    design_value = parameters[name]
+    critical = float(Values(model, parameter_set, parameters)[f"{name}_c"]) if has_critical else math.nan
     speed = name in SPEEDS
-    low, high = _default_range(design, name, end, at)
+    low, high = _choose_range(design, name, end, design_value)
 
     def coefficients(x: Array) -> Array:
         """Of shape (n, degree + 1)."""
@@ -136,54 +140,67 @@ def growth(
     is_open, is_polynomial = speed and end is None, True
     try:
         a = coefficients_over(design.problem.posed, parameter_set, parameters, name)
-        crossed = find_crossings(a, low, math.inf if is_open else high)
+        crossings = find_crossings(a, low, math.inf if is_open else high)
     except InputError:
         is_open = is_polynomial = False
-        crossed = Crossings(tuple(_find_stability_changes(coefficients, np.linspace(low, high, _POINTS))), (), ())
-    crossed = user_crossings(model, crossed)
+        crossings = Crossings(
+            tuple(_find_stability_changes(coefficients, np.linspace(low, high, _GRID_POINTS))), (), ()
+        )
+    crossings = user_crossings(model, crossings)
     if is_open:
-        high = _last_event(crossed.found, at)
-    events = tuple(c for c in crossed.found if low < c.at < high)
-    centres = [at, *(c.at for c in events if "EP" in c.kind)]
-    first = low + (high - low) / _POINTS if speed else low  # at rest a speed leaves roots 0
-    grid = np.unique(np.concatenate([np.linspace(first, high, _POINTS), *(c + _CROWD * (high - low) for c in centres)]))
+        high = _choose_end(crossings.found, design_value)
+    events = tuple(c for c in crossings.found if low < c.at < high)
+    centres = [design_value, *(c.at for c in events if "EP" in c.kind)]
+    first = low + (high - low) / _GRID_POINTS if speed else low  # at rest a speed leaves roots 0
+    grid = np.unique(
+        np.concatenate([np.linspace(first, high, _GRID_POINTS), *(c + _DENSE_OFFSETS * (high - low) for c in centres)])
+    )
     values = grid[(grid > low if speed else grid >= low) & (grid <= high)]
 
     c = coefficients(values)
     finite = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # neither a pole nor a root at infinity
     values, c = values[finite], c[finite]
-    found = roots(c)
+    root_values = roots(c)
     if is_polynomial:
-        stable, heavily_damped = _clip_bands(crossed.stable, low, high), _clip_bands(crossed.heavily_damped, low, high)
+        stable, heavily_damped = (
+            _clip_bands(bands, low, high) for bands in (crossings.stable, crossings.heavily_damped)
+        )
     else:
-        inside = is_stable(c)
-        stable = tuple(_find_runs(values, inside, events))
-        heavily_damped = tuple(_find_runs(values, inside & np.all(found.imag == 0, axis=-1), ()))
+        is_inside = is_stable(c)
+        stable = tuple(_find_runs(values, is_inside, events))
+        heavily_damped = tuple(_find_runs(values, is_inside & np.all(root_values.imag == 0, axis=-1), ()))
     rate = (
         None
         if parameter_set.rate is None
         else np.zeros(values.shape) + parameter_set.rate({**parameters, name: values})
     )
-    many = [c.at for c in events if _has_many_roots(c.kind)] + [at] * _has_many_roots(design.structure)
-    followed = follow_modes(
-        values, found, at, many, is_bicycle=is_bicycle(model) and model.degree == _BICYCLE, over_speed=speed
+    multiple_meetings = [c.at for c in events if _has_many_roots(c.kind)] + [design_value] * _has_many_roots(
+        design.structure
+    )
+    modes = follow_modes(
+        values,
+        root_values,
+        design_value,
+        multiple_meetings,
+        is_bicycle=is_bicycle(model) and model.degree == _BICYCLE_DEGREE,
+        over_speed=speed,
     )
     if model.carrier is not None:
-        found = user_root_array(model, found)
-        followed = tuple(
-            replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * model.carrier) for m in followed
+        root_values = user_root_array(model, root_values)
+        modes = tuple(
+            replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * model.carrier) for m in modes
         )
     return Growth(
         parameter_set[name],
         values,
-        found,
+        root_values,
         critical,
-        at,
+        design_value,
         design.structure,
         stable,
         heavily_damped,
         design.problem,
-        followed,
+        modes,
         events,
         rate,
         tuple(r for r in design.roots if r.multiplicity > 1),
@@ -191,34 +208,34 @@ def growth(
 
 
 def _find_parameter(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str, float], str]:
-    """The parameter set that has the parameter, the design in that set, and the name."""
+    """The parameter set that has the parameter, the design in this set, and the name of the parameter."""
     problem = design.problem.posed
-    own, native = problem.parameter_set, problem.model.sets[0]
+    parameter_set, native = problem.parameter_set, problem.model.sets[0]
     if over is None:
-        over = speed_of(own) or next(iter(problem.free), own.names[0])
-    if over in own.names:
-        return own, dict(design.parameters), over
+        over = speed_of(parameter_set) or next(iter(problem.free), parameter_set.names[0])
+    if over in parameter_set.names:
+        return parameter_set, dict(design.parameters), over
     if over in native.names:
         return native, dict(design.dimensionless), over
-    accepted = dict.fromkeys((*own.names, *native.names))
+    accepted = dict.fromkeys((*parameter_set.names, *native.names))
     raise input_error(f"found '{over}'; {suggest(over, accepted)}", "over")
 
 
-def _default_range(design: Solution, name: str, end: float | None, at: float) -> Stretch:
+def _choose_range(design: Solution, name: str, end: float | None, design_value: float) -> Stretch:
     if end is not None:
         return min(end, 0.0), max(end, 0.0)
     if name in SPEEDS:
-        return 0.0, 2 * max(at, 0.5)
-    low, high = design.problem.free.get(name, (min(2 * at, 0.0), max(2 * at, 0.0)))
+        return 0.0, 2 * max(design_value, 0.5)
+    low, high = design.problem.free.get(name, (min(2 * design_value, 0.0), max(2 * design_value, 0.0)))
     return (low, high) if low < high else (low - 1.0, high + 1.0)
 
 
-def _last_event(found: Sequence[Crossing], at: float) -> float:
+def _choose_end(crossings: Sequence[Crossing], design_value: float) -> float:
     """The end of a range of speeds that shows all events."""
-    crossed = max((c.at for c in found if c.kind in ("weave", "capsize", "infinity")), default=0.0)
-    near = _FAR * max(at, crossed, 0.5)
-    last = max((c.at for c in found if c.at <= near), default=0.0)
-    return _MARGIN * max(last, crossed, at) if last else 2 * max(at, 0.5)
+    last_crossing = max((c.at for c in crossings if c.kind in ("weave", "capsize", "infinity")), default=0.0)
+    shown_end = _FAR_RATIO * max(design_value, last_crossing, 0.5)
+    last = max((c.at for c in crossings if c.at <= shown_end), default=0.0)
+    return _END_RATIO * max(last, last_crossing, design_value) if last else 2 * max(design_value, 0.5)
 
 
 def _clip_bands(bands: Sequence[Stretch], low: float, high: float) -> tuple[Stretch, ...]:
@@ -232,24 +249,24 @@ def _has_many_roots(structure: str) -> bool:
 
 def _find_stability_changes(coefficients: Callable[[Array], Array], grid: Array) -> Iterator[Crossing]:
     """Changes of stability between points of a grid, by bisection."""
-    inside = is_stable(coefficients(grid))
-    k = np.flatnonzero(inside[1:] != inside[:-1])
+    is_inside = is_stable(coefficients(grid))
+    k = np.flatnonzero(is_inside[1:] != is_inside[:-1])
     low, high = grid[k], grid[k + 1]
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        same = is_stable(coefficients(middle)) == inside[k]
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
+        on_low_side = is_stable(coefficients(middle)) == is_inside[k]
+        low, high = np.where(on_low_side, middle, low), np.where(on_low_side, high, middle)
     for at, a in zip(high.tolist(), coefficients(high), strict=True):
         if np.all(np.isfinite(a)) and a[0] != 0:  # nothing crosses the axis at a pole or with a root at infinity
             omega = abs(min(roots(a).tolist(), key=lambda z: abs(z.real)).imag)
             yield Crossing(at, "weave" if omega else "capsize", Root(0.0, omega), rightmost=True, changes=True)
 
 
-def _find_runs(values: Array, inside: Truth, events: Sequence[Crossing]) -> Iterator[Stretch]:
-    """First and last value of each run of points inside, extended to events before the next point outside."""
-    changes = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
+def _find_runs(values: Array, is_inside: Truth, events: Sequence[Crossing]) -> Iterator[Stretch]:
+    """First and last value of each run of points inside, extended to an event before the next point outside."""
+    changes = np.flatnonzero(np.diff(is_inside.astype(int), prepend=0, append=0))
     padded = np.concatenate([values[:1], values, values[-1:]])
     for k, m in changes.reshape(-1, 2):
-        begin = [c.at for c in events if padded[k] <= c.at <= values[k]]
-        end = [c.at for c in events if values[m - 1] <= c.at <= padded[m + 1]]
-        yield float(max(begin, default=values[k])), float(min(end, default=values[m - 1]))
+        begins = [c.at for c in events if padded[k] <= c.at <= values[k]]
+        ends = [c.at for c in events if values[m - 1] <= c.at <= padded[m + 1]]
+        yield float(max(begins, default=values[k])), float(min(ends, default=values[m - 1]))

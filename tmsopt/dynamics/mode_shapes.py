@@ -14,23 +14,23 @@ from tmsopt.problem.problem import Posed
 from tmsopt.records import Complex, Table, plain
 from tmsopt.roots import Root, Structure
 
-_DIGITS = 9  # of a shape; singular vectors have fewer digits than doubles
-_NOTHING = 1e-12  # amplitude, relative to the largest, below which there is no phase
+_DIGITS = 9  # printed digits of a shape; singular vectors have fewer correct digits than doubles
+_ZERO_AMPLITUDE = 1e-12  # amplitude, relative to the largest, below which a coordinate has no phase
 
 
 @dataclass(frozen=True)
 class ModeShape:
-    """One shape of a root, or of the upper root of a pair: e^(st) times the shape solves the equations of motion.
+    """One shape of a root, or of the upper root of a pair. The shape times e^(st) solves the equations of motion.
 
     Attributes:
-        re, im: the root, per unit of time of the motion; for a complex H s = −i ω.
-        multiplicity: number of roots that meet there.
-        geometric: number of independent shapes; 1 if all have merged in this one.
-        partial: lengths of the Jordan chains, longest first; a chain of k contains motions t^(k−1) e^(st).
-        amplitudes: amplitude of each coordinate, the largest 1.
+        re, im: the root, per unit of time of the motion; s = −i ω for a complex H.
+        multiplicity: number of roots that coincide in this root.
+        geometric: number of independent shapes; 1 if all shapes have merged.
+        partial: lengths of the Jordan chains, longest first; a chain of length k has motions up to t^(k−1) e^(st).
+        amplitudes: amplitude of each coordinate; the largest amplitude is 1.
         phases: phase lead over the first coordinate (lean) in degrees, from −180 to 180; nan for a coordinate at rest.
             For a complex H the argument of ψₖ/ψ₁, with motion as e^(−iωt).
-        eigenfrequency: ω = i s for a complex H, else None.
+        eigenfrequency: ω = i s for a complex H, otherwise None.
     """
 
     re: float
@@ -44,7 +44,7 @@ class ModeShape:
 
     @property
     def steer_per_lean(self) -> float:
-        """Ratio of steer to lean amplitude; nan without these, inf without lean."""
+        """Ratio of the steer amplitude to the lean amplitude; nan without these coordinates, inf without lean."""
         lean, steer = (self.amplitudes.get(n, math.nan) for n in ANGLES)
         return math.inf if lean == 0 and steer else steer / lean
 
@@ -61,8 +61,8 @@ def compute_mode_shapes(
 ) -> tuple[ModeShape, ...]:
     """Mode shapes at every root of a design, rightmost first: null vectors of its matrices at the root.
 
-    They are the right singular vectors of L(s) with the smallest singular values, at the roots of the ideal design,
-    because the roots of the rounded design are scattered where roots meet. For a complex H L(s) = s + i H.
+    They are the right singular vectors of L(s) with the smallest singular values; L(s) = s + i H for a complex H.
+    The roots s are those of the ideal design, because rounding separates multiple roots of the stored design.
 
     Args:
         rate: the unit of rates in 1/s.
@@ -75,42 +75,42 @@ def compute_mode_shapes(
         n = len(names)
         pencil = [np.eye(n), pencil[1][:n, :n] - 1j * pencil[1][:n, n:]]
     roots = [r for r in user_roots(model, structure.roots) if model.double or r.im >= 0]
-    found = []
+    shapes = []
     partial: tuple[int, ...]
     for root in sorted(roots, key=lambda r: (-r.re, -r.im)):
         s, geometric, partial = complex(root.re, root.im), 1, (1,)
         chain = min(chains, key=lambda d: abs(complex(d.re, d.im) - s), default=None)
         if root.multiplicity > 1 and chain is not None:
             s, geometric, partial = complex(chain.re, chain.im), chain.geometric, chain.partial
-        vectors = _null_vectors(pencil, s, geometric)
+        vectors = _compute_null_vectors(pencil, s, geometric)
         omega = next((complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag)])), None)
         for vector in vectors:
-            columns = _amplitudes(vector[: len(names)])
+            columns = _normalise_shape(vector[: len(names)])
             sizes, turns = (Table(dict(zip(names, column, strict=True))) for column in columns)
             at = rate * s.real, rate * s.imag
-            found.append(ModeShape(*at, root.multiplicity, len(vectors), partial, sizes, turns, omega))
-    return tuple(found)
+            shapes.append(ModeShape(*at, root.multiplicity, len(vectors), partial, sizes, turns, omega))
+    return tuple(shapes)
 
 
-def _null_vectors(pencil: Sequence[Any], s: complex, count: int) -> Complex:
-    """Null vectors of L(s) = Σ Pₖ s^(d−k) as rows; L is scaled first, so the result does not depend on units."""
+def _compute_null_vectors(pencil: Sequence[Any], s: complex, count: int) -> Complex:
+    """Null vectors of L(s) = Σ Pₖ s^(d−k) as rows. L is scaled first, so that the result does not depend on units."""
     powers = [s ** (len(pencil) - 1 - k) for k in range(len(pencil))]
     L = sum(z * P for z, P in zip(powers, pencil, strict=True))
     size = sum(abs(z) * np.abs(P) for z, P in zip(powers, pencil, strict=True))
-    rows = 1 / _or_one(size.max(axis=1, keepdims=True))
-    columns = 1 / _or_one((rows * size).max(axis=0))
+    rows = 1 / _replace_zeros(size.max(axis=1, keepdims=True))
+    columns = 1 / _replace_zeros((rows * size).max(axis=0))
     vectors: Complex = np.linalg.svd(rows * L * columns)[2][-count:].conj() * columns
     return vectors
 
 
-def _or_one(sizes: Any) -> Any:
+def _replace_zeros(sizes: Any) -> Any:
     return np.where(sizes > 0, sizes, 1.0)
 
 
-def _amplitudes(vector: Complex) -> tuple[list[float], list[float]]:
+def _normalise_shape(vector: Complex) -> tuple[list[float], list[float]]:
     """Amplitudes and phases; the first coordinate that moves has phase 0."""
     sizes = np.abs(vector) / np.abs(vector).max()
-    moving = sizes > _NOTHING
-    turned = vector / vector[int(np.argmax(moving))]
-    clean = np.where(np.abs(turned.imag) > _NOTHING * np.abs(turned), turned, turned.real)
-    return np.where(moving, sizes, 0.0).tolist(), np.where(moving, np.degrees(np.angle(clean)), np.nan).tolist()
+    is_moving = sizes > _ZERO_AMPLITUDE
+    rotated = vector / vector[int(np.argmax(is_moving))]
+    rounded = np.where(np.abs(rotated.imag) > _ZERO_AMPLITUDE * np.abs(rotated), rotated, rotated.real)
+    return np.where(is_moving, sizes, 0.0).tolist(), np.where(is_moving, np.degrees(np.angle(rounded)), np.nan).tolist()

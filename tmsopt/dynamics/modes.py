@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 
 from tmsopt.records import Array, Complex
 
-_MIN_POINTS, _MIN_SHARE = (
-    3,
-    1e-4,
-)  # of a piece, and of the range; rounding errors make shorter pieces, which are ignored
-_ISOLATED = 0.5  # two roots meet without a third if their distance is at most this share of the distance to the third
+_MIN_POINTS, _MIN_SHARE = 3, 1e-4  # fewest points of a piece, and smallest share of the range; rounding makes others
+# two roots meet without a third if their distance is at most this share of the distance to the third
+_ISOLATED_RATIO = 0.5
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,7 @@ class Mode:
 
 @dataclass(frozen=True)
 class _Piece:
-    """A range with a constant number of real roots: the real roots ascending, then the pairs."""
+    """A range of values with a constant number of real roots: first the real roots, ascending, then the pairs."""
 
     values: Array
     roots: Complex
@@ -62,13 +60,17 @@ def follow_modes(
     parts = _split_pieces(values, roots, multiple_meetings)
     if not parts:
         return ()
-    typical = [k for k, part in enumerate(parts) if is_bicycle and part.roots.shape[1] == 3 and part.real == 2]
-    nearest = min(range(len(parts)), key=lambda k: (np.abs(parts[k].values - design).min(), -len(parts[k].values)))
-    first = nearest if not typical or (not over_speed and nearest in typical) else typical[-1]
+    typical_pieces = [k for k, part in enumerate(parts) if is_bicycle and part.roots.shape[1] == 3 and part.real == 2]
+    design_piece = min(range(len(parts)), key=lambda k: (np.abs(parts[k].values - design).min(), -len(parts[k].values)))
+    first = (
+        design_piece
+        if not typical_pieces or (not over_speed and design_piece in typical_pieces)
+        else typical_pieces[-1]
+    )
     names = {first: _name_modes(parts[first], design, is_bicycle)}
     for order in (range(first, len(parts)), range(first, -1, -1)):
-        for before, k in pairwise(order):
-            new_names = _pass_names(parts[before], names[before], parts[k], forward=k > before)
+        for previous, k in pairwise(order):
+            new_names = _pass_names(parts[previous], names[previous], parts[k], forward=k > previous)
             is_mixed = is_bicycle and any("weave +" in name or "+ weave" in name for name in new_names)
             names[k] = new_names if new_names and not is_mixed else _name_modes(parts[k], design, is_bicycle)
     return tuple(
@@ -85,17 +87,17 @@ def _split_pieces(values: Array, roots: Complex, multiple_meetings: Sequence[flo
     for rows in np.split(np.arange(len(values)), cuts):
         if len(rows) < _MIN_POINTS or np.ptp(values[rows]) < _MIN_SHARE * np.ptp(values):
             continue
-        inside, count = roots[rows], int(real[rows[0]])
-        reals = np.sort(inside.real[inside.imag == 0].reshape(len(rows), count), axis=1)
-        pairs = np.sort_complex(inside[inside.imag > 0].reshape(len(rows), -1))
+        piece_roots, count = roots[rows], int(real[rows[0]])
+        reals = np.sort(piece_roots.real[piece_roots.imag == 0].reshape(len(rows), count), axis=1)
+        pairs = np.sort_complex(piece_roots[piece_roots.imag > 0].reshape(len(rows), -1))
         for k in range(1, len(rows)) if pairs.shape[1] > 1 else ():
             predicted = 2 * pairs[k - 1] - pairs[k - 2] if k > 1 else pairs[k - 1]
-            pairs[k] = pairs[k][_match(predicted, pairs[k])]
+            pairs[k] = pairs[k][_match_roots(predicted, pairs[k])]
         parts.append(_Piece(values[rows], np.concatenate([reals, pairs], axis=1), count))
     return parts
 
 
-def _match(a: Complex, b: Complex) -> NDArray[np.intp]:
+def _match_roots(a: Complex, b: Complex) -> NDArray[np.intp]:
     """Indices of b matched one to one to a, with the least sum of squared distances."""
     squares = np.abs(a[:, None] - b) ** 2
     if len(a) <= 2:  # always so for a bicycle
@@ -103,7 +105,7 @@ def _match(a: Complex, b: Complex) -> NDArray[np.intp]:
         return order[::-1] if squares[order, order[::-1]].sum() < squares.trace() else order
     from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import, and is rarely needed
 
-    return np.asarray(linear_sum_assignment(squares)[1])
+    return linear_sum_assignment(squares)[1]
 
 
 def _name_modes(part: _Piece, design: float, is_bicycle: bool) -> list[str]:
@@ -119,23 +121,31 @@ def _name_modes(part: _Piece, design: float, is_bicycle: bool) -> list[str]:
     return [f"real {count - k}" for k in range(count)] + [f"pair {k}" for k in rank]
 
 
-def _pass_names(old: _Piece, names: list[str], new: _Piece, forward: bool) -> list[str]:
-    """Names of the next piece, from those of the previous one, if just two roots meet between them; else empty."""
-    if abs(old.real - new.real) != 2:
+def _pass_names(old_piece: _Piece, names: list[str], new_piece: _Piece, forward: bool) -> list[str]:
+    """Names of the next piece, from the names of the previous piece; empty unless just two roots meet between them."""
+    if abs(old_piece.real - new_piece.real) != 2:
         return []
-    many, few = (old, new) if old.real > new.real else (new, old)  # real roots
-    r, p = (part.roots[-1 if (part is old) == forward else 0] for part in (many, few))
-    i = int(np.diff(r[: many.real].real).argmin())  # real roots i and i + 1 form the pair j
-    j = few.real + int(p[few.real :].imag.argmin())
-    others, rest = np.delete(np.arange(len(r)), [i, i + 1]), np.delete(np.arange(len(p)), j)
-    distances = [np.abs(x - y).min(initial=np.inf) for x, y in ((r[others], r[i : i + 2].mean()), (p[rest], p[j].real))]
-    if abs(r[i + 1] - r[i]) > _ISOLATED * distances[0] or 2 * p[j].imag > _ISOLATED * distances[1]:
+    few_reals, many_reals = sorted((old_piece, new_piece), key=lambda piece: piece.real)
+    r, p = (part.roots[-1 if (part is old_piece) == forward else 0] for part in (many_reals, few_reals))
+    i = int(np.diff(r[: many_reals.real].real).argmin())  # real roots i and i + 1 form the pair j
+    j = few_reals.real + int(p[few_reals.real :].imag.argmin())
+    other_reals, other_roots = np.delete(np.arange(len(r)), [i, i + 1]), np.delete(np.arange(len(p)), j)
+    distances = [
+        np.abs(x - y).min(initial=np.inf)
+        for x, y in ((r[other_reals], r[i : i + 2].mean()), (p[other_roots], p[j].real))
+    ]
+    if abs(r[i + 1] - r[i]) > _ISOLATED_RATIO * distances[0] or 2 * p[j].imag > _ISOLATED_RATIO * distances[1]:
         return []
-    rest[few.real :] = rest[few.real :][_match(r[others[few.real :]], p[rest[few.real :]])]  # real ones stay in order
-    if many is old:
-        both = names[i] if names[i] == names[i + 1] else f"{names[i + 1]} + {names[i]}"
-        new_names = {j: both} | {b: names[a] for a, b in zip(others, rest, strict=True)}
+    # the real roots stay in order; only pairs are matched
+    other_roots[few_reals.real :] = other_roots[few_reals.real :][
+        _match_roots(r[other_reals[few_reals.real :]], p[other_roots[few_reals.real :]])
+    ]
+    if many_reals is old_piece:
+        pair_name = names[i] if names[i] == names[i + 1] else f"{names[i + 1]} + {names[i]}"
+        new_names = {j: pair_name} | {b: names[a] for a, b in zip(other_reals, other_roots, strict=True)}
     else:
         upper, _, lower = names[j].partition(" + ")
-        new_names = {i: lower or upper, i + 1: upper} | {a: names[b] for a, b in zip(others, rest, strict=True)}
+        new_names = {i: lower or upper, i + 1: upper} | {
+            a: names[b] for a, b in zip(other_reals, other_roots, strict=True)
+        }
     return [new_names[k] for k in range(len(new_names))]

@@ -25,12 +25,13 @@ from tmsopt.records import Array, Column, Table, Tabular, plain
 from tmsopt.roots import Structure
 
 _DECAYS, _GROWTHS, _RADIANS = 10.0, 3.0, 200.0  # durations in units of 1/|abscissa| (twice) and 1/|s|
-_DOUBLINGS, _STILL = 8, 0.002  # doublings of the duration until the second half is this much smaller than the peak
+_DOUBLINGS = 8  # most doublings of the duration
+_STILL_RATIO = 0.002  # largest share of the peak in the second half of a long enough duration
 _NO_GROWTH, _ROUNDING = 1e-9, 1e-12  # growth and decay, relative to the largest root, that are not significant
-_SLOW = _DECAYS * FINEST / (2 * math.pi * MOST)  # decay, relative to the fastest root, too slow for the grid
-_ALONE = 10.0  # duration in units of 1/‖A‖ if all roots are 0
-_AFTER = 1.2  # duration relative to the settling time
-_LARGEST = 600.0  # largest growth as an exponent of e
+_MIN_DECAY = _DECAYS * FINEST / (2 * math.pi * MOST)  # decay, relative to the fastest root, too slow for the grid
+_DRIFT = 10.0  # duration in units of 1/‖A‖ if all roots are 0
+_SETTLED_RATIO = 1.2  # duration relative to the settling time
+_MAX_EXPONENT = 600.0  # largest growth as an exponent of e
 
 
 @dataclass(frozen=True, repr=False)
@@ -40,17 +41,19 @@ class Simulation(Tabular):
     Attributes:
         parameters: every parameter of the design, as stored.
         disturbance: the disturbance that set it moving.
-        columns: ``t``, then for a bicycle ``phi delta phidot deltadot``, the torques of a controller (``T_phi``,
-            ``T_delta``) if there is one, and the path: ``x`` along the road, yaw ``psi``, the contacts ``y_rear`` and
-            ``y_front`` to the right. For a stated system ``q1 … q1dot …`` or ``x1 …``, for a complex H
+        columns: ``t``, then for a bicycle ``phi delta phidot deltadot``, the torques ``T_phi`` and ``T_delta`` of a
+            controller, and the path: ``x`` along the road, yaw ``psi``, and the positions ``y_rear`` and ``y_front`` of
+            the contacts, positive to the right. A stated system has ``q1 … q1dot …`` or ``x1 …``, and a complex H has
             ``psi1_re psi1_im psi2_re …``.
-        units: unit of each column that has one: s, rad, N m, m; for dimensionless parameters √(w/g), rad, m_B g w, w.
-        measures: one for each coordinate and torque. They cover the whole motion of a stable design, otherwise, or if
-            the decay takes more than some 20 000 oscillations, the time shown; in noise the times shown.
+        units: unit of each column that has a unit: s, rad, N m, m; for dimensionless parameters √(w/g), rad, m_B g w,
+            w.
+        measures: one for each coordinate and torque. For a stable design they cover the whole motion. They cover only
+            the time shown for an unstable design, for a decay over more than about 20 000 oscillations, and in noise.
         deviations: stationary standard deviations in noise; empty without noise or for an unstable design.
-        modes: mode shapes, rightmost first.
+        modes: mode shapes, in the order of their roots, rightmost first.
         structure: structure of the roots on the rightmost line, e.g. ``EP4``.
-        stable: whether all roots lie left of the axis; multiple roots, and roots of a complex H, by more than rounding.
+        stable: whether all roots are left of the axis; multiple roots, and roots of a complex H, must be left of it by
+            more than rounding errors.
         extra: the columns of torques and path.
 
     Example:
@@ -77,7 +80,7 @@ class Simulation(Tabular):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The columns without torques and path: ``t phi delta phidot deltadot``, or those of a stated system."""
+        """The columns without torques and path: ``t phi delta phidot deltadot`` for a bicycle."""
         return tuple(n for n in self.columns if n not in self.extra)
 
     def __getitem__(self, name: str) -> Column:
@@ -91,7 +94,7 @@ class Simulation(Tabular):
         """Write the columns as a table with their names as header, in s and rad.
 
         Args:
-            whole: include the torques of a controller and the path.
+            whole: also write the torques of a controller and the path.
 
         Raises:
             OSError: when the file cannot be written.
@@ -127,7 +130,7 @@ def simulate(
     """Simulate a design after a lean, a push of its handlebar or in noise; exact even where its roots meet.
 
     The motion is x(t) = e^(At) x(0) for the linear equations of the stored design, at evenly spaced times. At a
-    multiple root with a Jordan block the exponential contains the terms t^k e^(st). Rounding scatters the roots of an
+    multiple root with a Jordan block the exponential contains the terms t^k e^(st). Rounding moves the roots of an
     exceptional point, but changes e^(At) only by the size of the rounding. Peaks and settling times belong to the exact
     motion, not to the times shown.
 
@@ -137,16 +140,16 @@ def simulate(
             bicycle starts with a lean of 1 degree, and a stated system with 1 in its first coordinate.
         push, lean_push: impulse of steer torque and of lean torque at t = 0, in N m s; for dimensionless parameters in
             m_B g w √(w/g).
-        start: other initial states, by names of columns, in rad and s: ``{"phidot": 0.1}``, ``{"q1": 1}``,
+        start: other initial states, by the names of their columns, in rad and s: ``{"phidot": 0.1}``, ``{"q1": 1}``,
             ``{"psi1_re": 1}``.
         noise: intensity σ of white noise on the steer torque, in N m √s; its impulse over a time T has the standard
             deviation σ √T.
         seed: seed of the noise.
-        seconds: duration, for dimensionless parameters in √(w/g). By default until all has settled; for an unstable
-            design until it has grown e³-fold, or 200 radians of its fastest root.
-        points: number of evenly spaced times, including 0 and the last one.
-        at: parameters with other values here, such as the speed: ``{"v": 1.5}``. For several scenarios, the nominal
-            one is simulated.
+        seconds: duration, for dimensionless parameters in √(w/g). The default for a stable design is until all outputs
+            have settled, and for an unstable design until it has grown by e³, or 200/|s| of its largest root s.
+        points: number of evenly spaced times, including 0 and the end.
+        at: parameters that have other values than in the design, such as the speed: ``{"v": 1.5}``. If the problem has
+            several scenarios, the nominal design is simulated.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
@@ -161,42 +164,42 @@ def simulate(
 
     More: docs/how_to/motion.md
     """
-    given, whole = locals(), pose(design)
-    asked = whole.nominal
-    matrices_of(asked.model)
-    own = asked.ordered(parameters_of(design, whole, "", progress)) | dict(at or {})
-    if faults := list(parameter_faults(asked, own)):
+    arguments, posed = locals(), pose(design)
+    problem = posed.nominal
+    matrices_of(problem.model)
+    parameters = problem.ordered(parameters_of(design, posed, "", progress)) | dict(at or {})
+    if faults := list(parameter_faults(problem, parameters)):
         raise InputError([replace(f, key=("at", *f.key[-1:])) for f in faults])
     start_steps(progress, "following the motion")
-    system = system_of(asked, own)
-    disturbance = parse_disturbance(system, given)
-    found: Structure = asked.values(own)["structure"]
-    structure = user_structure(asked.model, found)
-    parameter_set = asked.parameter_set
-    rate = 1.0 if parameter_set.rate is None else float(parameter_set.rate(own))
+    system = system_of(problem, parameters)
+    disturbance = parse_disturbance(system, arguments)
+    model_structure: Structure = problem.values(parameters)["structure"]
+    structure = user_structure(problem.model, model_structure)
+    parameter_set = problem.parameter_set
+    rate = 1.0 if parameter_set.rate is None else float(parameter_set.rate(parameters))
     x = disturbance.state(system)
-    stable = _is_stable(asked, found)
-    decays, ending, motion = _choose_duration(system, x, structure, stable, rate, seconds, bool(noise))
-    times, step = np.linspace(0.0, ending, points), ending / (points - 1)
+    stable = _is_stable(problem, model_structure)
+    decays, end_time, motion = _choose_duration(system, x, structure, stable, rate, seconds, bool(noise))
+    times, step = np.linspace(0.0, end_time, points), end_time / (points - 1)
     watched, deviations = {n: system.rows[n] for n in (*system.coordinates, *system.torques)}, Table[float]()
     if noise:
         force = disturbance.noise * system.impulses["T_delta"]
         states = simulate_noise(system.A, x, force, step, points, seed)
         measures = tuple(_find_peak(name, times, states @ row) for name, row in watched.items())
-        deviations = _long_run_deviations(system, force) if stable else deviations
+        deviations = _compute_deviations(system, force) if stable else deviations
     else:
         states = sample_motion(system.A, x, step, points)
         measures = tuple(measure_output(name, row, motion, decays) for name, row in watched.items())
     base = tuple(n for n in system.names if n not in system.torques)
-    rest = tuple(n for n in system.rows if n not in base)
-    columns = {"t": Column(times)} | {n: Column(states @ system.rows[n]) for n in (*base, *rest)}
-    if rest:
-        columns["x"], rest = Column(system.speed * times), (*rest, "x")
-    modes = compute_mode_shapes(asked, own, found, rate)
+    extra_names = tuple(n for n in system.rows if n not in base)
+    columns = {"t": Column(times)} | {n: Column(states @ system.rows[n]) for n in (*base, *extra_names)}
+    if extra_names:
+        columns["x"], extra_names = Column(system.speed * times), (*extra_names, "x")
+    modes = compute_mode_shapes(problem, parameters, model_structure, rate)
     units = Table({n: system.units[n] for n in columns if n in system.units})
     return Simulation(
-        asked.problem,
-        Table(own),
+        problem.problem,
+        Table(parameters),
         disturbance,
         Table(columns),
         units,
@@ -205,16 +208,16 @@ def simulate(
         modes,
         structure.name,
         stable,
-        rest,
+        extra_names,
     )
 
 
-def _is_stable(problem: Posed, found: Structure) -> bool:
-    """Whether the design is stable; multiple roots, and roots of a complex H, by more than rounding."""
-    rightmost = [r.multiplicity for r in found.roots if r.re == found.abscissa]
+def _is_stable(problem: Posed, structure: Structure) -> bool:
+    """Whether the design is stable; multiple roots, and roots of a complex H, by more than rounding errors."""
+    rightmost = [r.multiplicity for r in structure.roots if r.re == structure.abscissa]
     exact = problem.model.carrier is None and max(rightmost, default=1) == 1
-    largest = max((r.size for r in found.roots), default=0.0)
-    return found.abscissa < (0.0 if exact else -_ROUNDING * largest)
+    largest = max((r.size for r in structure.roots), default=0.0)
+    return structure.abscissa < (0.0 if exact else -_ROUNDING * largest)
 
 
 def _choose_duration(
@@ -231,27 +234,27 @@ def _choose_duration(
         )
     z = rate * np.array([complex(r.re, r.im) for r in structure.roots])
     abscissa, fastest, largest = map(float, (z.real.max(), np.abs(z.imag).max(), np.abs(z).max()))
-    if seconds is not None and seconds * abscissa > _LARGEST:
-        accepted = f"accepted: up to {_LARGEST / abscissa:.4g}, in which it grows by e^{_LARGEST:.0f}"
+    if seconds is not None and seconds * abscissa > _MAX_EXPONENT:
+        accepted = f"accepted: up to {_MAX_EXPONENT / abscissa:.4g}, in which it grows by e^{_MAX_EXPONENT:.0f}"
         raise input_error(f"found {seconds:.6g} for an unstable design; {accepted}", "seconds")
     size = float(np.linalg.norm(system.A[: len(system.names), : len(system.names)], 2))
-    ending = _RADIANS / largest if largest > _ROUNDING * size else _ALONE / (size or 1.0)
-    if not stable or -abscissa < max(_SLOW * fastest, _ROUNDING * largest):
+    end_time = _RADIANS / largest if largest > _ROUNDING * size else _DRIFT / (size or 1.0)
+    if not stable or -abscissa < max(_MIN_DECAY * fastest, _ROUNDING * largest):
         if abscissa > _NO_GROWTH * largest:
-            ending = min(ending, _GROWTHS / abscissa)
-        ending = _round_up(ending) if seconds is None else seconds
-        return False, ending, sample_grid(system.A, x, ending, fastest, largest)
-    ending, rows = _DECAYS / -abscissa, [system.rows[name] for name in system.coordinates]
+            end_time = min(end_time, _GROWTHS / abscissa)
+        end_time = _round_up(end_time) if seconds is None else seconds
+        return False, end_time, sample_grid(system.A, x, end_time, fastest, largest)
+    end_time, rows = _DECAYS / -abscissa, [system.rows[name] for name in system.coordinates]
     for _ in range(_DOUBLINGS):
-        motion = sample_grid(system.A, x, ending, fastest, largest)
+        motion = sample_grid(system.A, x, end_time, fastest, largest)
         values = np.abs(motion.states @ np.array(rows).T)
-        if (values[motion.times > ending / 2].max(axis=0) <= _STILL * values.max(axis=0)).all():
+        if (values[motion.times > end_time / 2].max(axis=0) <= _STILL_RATIO * values.max(axis=0)).all():
             break
-        ending *= 2
+        end_time *= 2
     if seconds is None:
         settled = [measure_output("", row, motion, True).settling for row in rows]
-        last = max((s for s in settled if s > 0), default=ending)
-        seconds = _round_up(ending if noisy else _AFTER * last)
+        last = max((s for s in settled if s > 0), default=end_time)
+        seconds = _round_up(end_time if noisy else _SETTLED_RATIO * last)
     return True, seconds, motion
 
 
@@ -267,8 +270,8 @@ def _find_peak(name: str, times: Array, values: Array) -> Measure:
     return Measure(name, float(values[k]), float(times[k]), math.nan, math.nan)
 
 
-def _long_run_deviations(system: System, force: Array) -> Table[float]:
-    """Stationary standard deviations of all columns but the path, which diffuses without limit."""
+def _compute_deviations(system: System, force: Array) -> Table[float]:
+    """Stationary standard deviations of all columns except the path, whose deviation grows without limit."""
     n = len(system.names)
     spread = stationary_covariance(system.A[:n, :n], force[:n])
     rows = {name: system.rows[name][:n] for name in (*ANGLES, *RATES, *system.torques)}

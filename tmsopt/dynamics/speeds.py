@@ -1,4 +1,4 @@
-"""All critical speeds of a bicycle: weave, capsize, and speeds at which roots meet."""
+"""Finds all critical speeds of a bicycle: weave speeds, capsize speeds, and speeds at which roots meet."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -35,9 +35,9 @@ class Speeds(Tabular):
         stable: bands of speeds with all Re s < 0.
         heavily_damped: bands with all s real and negative.
         always: the kinds ``capsize``, ``weave``, ``EP2`` or ``infinity`` that are present at every speed.
-        marginal: bands with no root right of the imaginary axis and simple roots on it, where roots stay on it; a root
-            0 that is present at every speed does not count.
-        zeros: multiplicity of that root 0.
+        marginal: if roots stay on the imaginary axis, the bands with no root right of the axis and only simple roots on
+            it. A root 0 that is present at every speed does not count.
+        zeros: multiplicity of the root 0 that is present at every speed.
 
     Example:
         >>> found = tmsopt.speeds("problems/whipple_benchmark.toml")
@@ -106,13 +106,14 @@ def speeds(
 ) -> Speeds:
     """Every weave and capsize speed of a design, and every speed at which roots meet, by exact root isolation.
 
-    The coefficients are polynomials in the speed. The critical speeds are roots of polynomials too, so none is missed.
+    The coefficients are polynomials in the speed. The critical speeds are also roots of polynomials, so none is missed.
 
     Args:
         design: a solution, a problem or its file, or the parameters of a design of `problem`. A problem with further
             free parameters is solved first.
         parameter: the parameter that varies, by default the speed; the coefficients must be polynomials in it.
-        between: the range; by default that of the problem if the parameter is free, else its whole physical range.
+        between: the range of the parameter; by default the range in the problem if the parameter is free, otherwise its
+            whole physical range.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
@@ -128,65 +129,67 @@ def speeds(
 
     More: docs/explanation/weave_and_capsize.md
     """
-    whole = pose(problem if problem is not None and isinstance(design, Mapping) else design)
-    asked = whole.nominal
-    parameter_set = asked.parameter_set
+    posed = pose(problem if problem is not None and isinstance(design, Mapping) else design)
+    nominal = posed.nominal
+    parameter_set = nominal.parameter_set
     name = parameter if parameter is not None else speed_of(parameter_set)
     if name is None:
-        message = f"the model '{asked.model.name}' has no speed; name the parameter that varies, "
+        message = f"the model '{nominal.model.name}' has no speed; name the parameter that varies, "
         message += f"`--parameter NAME` (`parameter=` in Python); accepted: {' '.join(parameter_set.names)}"
         raise input_error(message, "parameter")
     if name not in parameter_set.names:
         raise input_error(f"unknown parameter '{name}'; {suggest(name, parameter_set.names)}", "parameter")
-    own = parameters_of(design, whole, name, progress)
+    parameters = parameters_of(design, posed, name, progress)
     start_steps(progress, "isolating speeds")
-    allowed = parameter_set[name].range
+    physical_range = parameter_set[name].range
     try:
-        lower, upper = map(float, asked.free.get(name, (allowed.lower, allowed.upper)) if between is None else between)
+        lower, upper = map(
+            float, nominal.free.get(name, (physical_range.lower, physical_range.upper)) if between is None else between
+        )
         if not -math.inf < lower < upper:
             raise ValueError
     except (TypeError, ValueError):
         message = f"found {short(between)}; accepted: a smaller and a larger number, `--between LOW,HIGH`"
         raise input_error(message, "between") from None
-    found = user_crossings(
-        asked.model, find_crossings(coefficients_over(asked, parameter_set, own, name), lower, upper)
+    crossings = user_crossings(
+        nominal.model, find_crossings(coefficients_over(nominal, parameter_set, parameters, name), lower, upper)
     )
-    return Speeds(asked.problem, name, Table(own), lower, upper, **vars(found))
+    return Speeds(nominal.problem, name, Table(parameters), lower, upper, **vars(crossings))
 
 
 def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
-    """The bands of all physical speeds in which a design is stable; None without a speed. Faster than `speeds`.
+    """The bands of all physical speeds in which a design is stable; None without a speed. It is faster than `speeds`.
 
     Raises:
         InputError: if the coefficients are not polynomials in the speed.
     """
-    asked = design.problem.posed.nominal
-    parameter_set, name = asked.parameter_set, speed_of(asked.parameter_set)
+    problem = design.problem.posed.nominal
+    parameter_set, name = problem.parameter_set, speed_of(problem.parameter_set)
     if name is None or not math.isfinite(parameter_set[name].range.lower):
         return None
-    a, ends = coefficients_over(asked, parameter_set, design.parameters, name), parameter_set[name].range
-    return find_crossings(a, ends.lower, ends.upper, bands_alone=True).stable
+    a, ends = coefficients_over(problem, parameter_set, design.parameters, name), parameter_set[name].range
+    return find_crossings(a, ends.lower, ends.upper, bands_only=True).stable
 
 
 def speed_of(parameter_set: ParameterSet) -> str | None:
-    """The parameter of a set that is a speed: in m/s, or the Froude number."""
+    """The parameter of a set that is a speed: its unit is m/s, or it is the Froude number."""
     return next((p.name for p in parameter_set.parameters if p.unit == "m/s" or p.name == "Fr"), None)
 
 
 def coefficients_over(
-    problem: Posed, parameter_set: ParameterSet, own: Mapping[str, float], name: str
+    problem: Posed, parameter_set: ParameterSet, parameters: Mapping[str, float], name: str
 ) -> Sequence[Polynomial]:
     """The coefficients of a design as polynomials in one of its parameters.
 
     Raises:
         InputError: if they are not polynomials.
     """
-    nodes = {**problem.as_nodes(own), name: symbol(name)}
+    nodes = {**problem.as_nodes(parameters), name: symbol(name)}
     at = problem.model.algebraic(parameter_set.native({n: nodes[n] for n in parameter_set.names}))
     try:
         with flint.ctx.workdps(DIGITS):
-            over = fold(formula(at.values()), {name: flint.arb_poly([0, 1])}, BALLS)
-            exact_ones = {n: _to_fractions(x) for n, x in zip(at, over, strict=True)}
+            polynomials = fold(formula(at.values()), {name: flint.arb_poly([0, 1])}, BALLS)
+            exact_ones = {n: _to_fractions(x) for n, x in zip(at, polynomials, strict=True)}
             a = [list(flint.fmpq_poly([0]) + c) or [flint.fmpq(0)] for c in problem.model.polynomial(**exact_ones)]
     except (TypeError, AttributeError, ValueError, ArithmeticError, DomainError):  # not a polynomial
         a = []
@@ -200,15 +203,15 @@ def _to_fractions(x: Any) -> Any:
     return flint.fmpq_poly([rational(c) for c in x]) if isinstance(x, flint.arb_poly) else rational(x)
 
 
-def parameters_of(design: Any, whole: Posed, name: str, progress: Listener | None) -> dict[str, float]:
+def parameters_of(design: Any, problem: Posed, name: str, progress: Listener | None) -> dict[str, float]:
     """The parameters of the design; a problem with free parameters other than `name` is solved first."""
     if isinstance(design, Solution):
         return dict(design.parameters)
     if isinstance(design, Mapping):
-        own = {**whole.fixed, **design}
-        if faults := [f for f in parameter_faults(whole, own) if f.key[-1] != name]:
+        parameters = {**problem.fixed, **design}
+        if faults := [f for f in parameter_faults(problem, parameters) if f.key[-1] != name]:
             raise InputError(faults)
-        return own
-    if set(whole.free) <= {name}:
-        return dict(whole.fixed)
-    return dict(solve(whole, progress=progress, interruptible=False).parameters)
+        return parameters
+    if set(problem.free) <= {name}:
+        return dict(problem.fixed)
+    return dict(solve(problem, progress=progress, interruptible=False).parameters)

@@ -16,7 +16,9 @@ from tmsopt.records import Array, Table
 ANGLES, RATES, TORQUES = ("phi", "delta"), ("phidot", "deltadot"), ("T_phi", "T_delta")
 """Names of lean and steer (positive to the right), of their rates, and of a controller's torques."""
 
-_SINGULAR = 1e15  # condition number of a mass matrix, with columns of equal size, above which it counts as singular
+_MAX_CONDITION = (
+    1e15  # condition number of a mass matrix, with columns of equal size, above which it counts as singular
+)
 
 
 @dataclass(frozen=True)
@@ -24,13 +26,14 @@ class System:
     """x′ = A x, in the units of time, torque and length of `units`.
 
     Attributes:
-        names: names of the states; for a bicycle without the last two, yaw and lateral position of the rear contact.
+        names: names of the states, for a bicycle without its last two states, the yaw and the lateral position of the
+            rear contact.
         coordinates: lean and steer, or the coordinates of a stated system.
         A: shape (n, n).
-        rows: column of a table → row c of the output c x, including the torques of a controller and the path.
-        impulses: ``T_phi``, ``T_delta`` → change of x by a unit impulse of that torque; empty without torques.
+        rows: column of the motion → row c of the output c x. Outputs include the torques of a controller and the path.
+        impulses: ``T_phi``, ``T_delta`` → change of x by a unit impulse of the torque; empty without torques.
         speed: forward speed of a bicycle; nan for other systems.
-        units: ``t`` and names of columns → unit, empty for a dimensionless one.
+        units: ``t`` and names of columns → unit; a dimensionless column has an empty unit.
     """
 
     names: tuple[str, ...]
@@ -53,7 +56,7 @@ def is_bicycle(model: Model) -> bool:
 
 
 def matrices_of(model: Model) -> Any:
-    """The matrices of a model as a function of its native parameters; for a complex H those of (Re ψ, Im ψ).
+    """The matrices of a model as a function of its native parameters; for a complex H, the matrices of (Re ψ, Im ψ).
 
     Raises:
         InputError: if only the characteristic polynomial is known.
@@ -77,11 +80,11 @@ def coordinates_of(model: Model, pencil: Sequence[Any]) -> tuple[str, ...]:
 
 
 def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
-    """The linear system of a design, in SI if the problem is in SI, else in the model's own units.
+    """The linear system of a design, in SI if the problem is in SI, otherwise in the model's own units.
 
-    M q″ + D q′ + K q = 0 becomes x′ = A x with x = (q, q′); two matrices I, −A give A directly. A bicycle has yaw and
-    the rear contact of `contact_path` as further states, so they are exact too. For ψ′ = −i H ψ with H = R + i J, the
-    matrix [[J, R], [−R, J]] is reordered to the states Re ψ₁, Im ψ₁, Re ψ₂ ….
+    M q″ + D q′ + K q = 0 becomes x′ = A x with x = (q, q′). Two matrices I, −A give A directly. A bicycle has the yaw
+    and the rear contact of `contact_path` as further states, so these are also exact. For ψ′ = −i H ψ with H = R + i J,
+    the matrix [[J, R], [−R, J]] is reordered to the states Re ψ₁, Im ψ₁, Re ψ₂ ….
 
     Raises:
         InputError: without matrices, or if the mass matrix is singular.
@@ -90,15 +93,15 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     native = parameter_set.native(parameters)
     pencil = matrices_of(model)(native)
     n = len(pencil[0])
-    scaled = pencil[0] / np.maximum(np.abs(pencil[0]).max(axis=0), 1e-300)
-    if not all(np.isfinite(P).all() for P in pencil) or np.linalg.cond(scaled) > _SINGULAR:
+    scaled_mass = pencil[0] / np.maximum(np.abs(pencil[0]).max(axis=0), 1e-300)
+    if not all(np.isfinite(P).all() for P in pencil) or np.linalg.cond(scaled_mass) > _MAX_CONDITION:
         message = "the mass matrix of this design is singular: a root is at infinity, and there is no motion to show"
         raise input_error(message, "parameters")
     A = -np.linalg.solve(pencil[0], pencil[-1])
     if len(pencil) == 3:
         A = np.block([[np.zeros((n, n)), np.eye(n)], [A, -np.linalg.solve(pencil[0], pencil[1])]])
     if is_bicycle(model):
-        return _bicycle_system(A, pencil[0], problem, parameters)
+        return _build_bicycle_system(A, pencil[0], problem, parameters)
     q = coordinates_of(model, pencil)
     names = (*q, *(f"{name}dot" for name in q)) if len(pencil) == 3 else q
     if model.double is not None:
@@ -108,7 +111,7 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     return System(names, q, A, Table(dict(zip(names, np.eye(len(names)), strict=True))), Table(), math.nan, Table())
 
 
-def _bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, float]) -> System:
+def _build_bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[str, float]) -> System:
     """The system with the path as two more states and the torques of a controller as rows, in the user's units."""
     parameter_set = problem.parameter_set
     native = parameter_set.native(parameters)
@@ -117,15 +120,15 @@ def _bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[s
     if feedback is not None:
         mass, driven = np.array(feedback.mass, dtype=float), {TORQUES[k]: k for k in sorted(feedback.driven)}
     names = (*ANGLES, *RATES, *(driven if lagged else ()))
-    yaw, yaw_of_rate, v, w, aside = map(float, contact_path(native))
+    yaw, yaw_of_rate, v, w, contact_shift = map(float, contact_path(native))
     n = len(names)
-    whole = np.zeros((n + 2, n + 2))
-    whole[:n, :n] = A
-    whole[n, [1, 3]] = yaw, yaw_of_rate
-    whole[n + 1, n] = v
+    matrix = np.zeros((n + 2, n + 2))
+    matrix[:n, :n] = A
+    matrix[n, [1, 3]] = yaw, yaw_of_rate
+    matrix[n + 1, n] = v
     unit = np.eye(n + 2)
     rows = {**dict(zip(names, unit, strict=False)), "psi": unit[n], "y_rear": unit[n + 1]}
-    rows["y_front"] = unit[n + 1] + w * unit[n] + aside * unit[1]
+    rows["y_front"] = unit[n + 1] + w * unit[n] + contact_shift * unit[1]
     if feedback is not None and not lagged:
         gains = np.hstack([np.array(feedback.gains, dtype=float), np.zeros((2, 2))])
         rows |= {name: -gains[k] for name, k in driven.items()}
@@ -140,17 +143,23 @@ def _bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Mapping[s
         (TORQUES, torque, ("m_B g w", "N m")),
         (("x", "y_rear", "y_front"), length, ("w", "m")),
     )
-    one = {name: size for each, size, _ in kinds for name in each}
-    states = np.array([one[name] for name in (*names, "psi", "y_rear")])
+    unit_sizes = {name: size for names_of_kind, size, _ in kinds for name in names_of_kind}
+    states = np.array([unit_sizes[name] for name in (*names, "psi", "y_rear")])
     impulses = {
         name: rate / torque * states * np.r_[0.0, 0.0, jumps[:, k], np.zeros(n - 2)] for k, name in enumerate(TORQUES)
     }
     return System(
         names,
         ANGLES,
-        rate * states[:, None] * whole / states,
-        Table({name: one[name] * row / states for name, row in rows.items()}),
+        rate * states[:, None] * matrix / states,
+        Table({name: unit_sizes[name] * row / states for name, row in rows.items()}),
         Table(impulses),
         v * rate * length,
-        Table({name: either[parameter_set.rate is not None] for each, _, either in kinds for name in each}),
+        Table(
+            {
+                name: either[parameter_set.rate is not None]
+                for names_of_kind, _, either in kinds
+                for name in names_of_kind
+            }
+        ),
     )

@@ -1,7 +1,7 @@
-"""Evaluates a design from its parameters alone, without trusting a solver.
+"""Evaluates a design from its parameters only, without trusting a solver.
 
-In: a problem and a design. Out: objective and violations, worst case, bounds that need no search, proofs over bands,
-certified digits, the laws that the design obeys. Open `recheck` first.
+Input: a problem and a design. Output: objective and violations, worst case, bounds that need no search, proofs over
+bands, certified digits, and the laws that the design obeys. Open `recheck` first.
 """
 
 import lazy_loader

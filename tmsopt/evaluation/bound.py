@@ -1,13 +1,14 @@
 """Lower bounds on the abscissa without a search: geometric mean of the roots, and linear relations of coefficients.
 
-The product of the roots is ±aₙ/a0, so the abscissa is at least ω0 = −|aₙ/a0|^(1/n), whatever the other coefficients.
+The product of the roots is ±aₙ/a0. So the abscissa is at least ω0 = −|aₙ/a0|^(1/n), for any other coefficients.
 
-A relation Σ b_k a_k = 0 that holds for all free parameters gives a bound too. If no root is right of γ, the
-coefficients of p(t + γ) all have the sign of a0 or vanish. With h(z) = Σ b_k C(n, k) z^k, the relation weighs the
-coefficient of t^(n−i) by (n − i)! h⁽ⁱ⁾(−γ). It cannot hold if h and all its derivatives have one sign at −γ, so the
-abscissa is at least −z, with z the largest real zero of h and its derivatives. If z is a zero of h itself, (s + z)ⁿ
-satisfies the relation, and parameters that give this polynomial attain the bound (Blondel, Gürbüzbalaban, Megretski and
-Overton 2012, theorem 7). The relation aₙ = c a0 gives ω0; a1 = c a0 gives the arithmetic mean of the roots.
+A relation Σ b_k a_k = 0 that holds for all free parameters also gives a bound. If no root is right of γ, the
+coefficients of p(t + γ) all have the sign of a0 or are 0. With h(z) = Σ b_k C(n, k) z^k, the relation multiplies the
+coefficient of t^(n−i) by (n − i)! h⁽ⁱ⁾(−γ). The relation cannot hold if h and all its derivatives have the same sign at
+−γ. So the abscissa is at least −z, where z is the largest real zero of h and its derivatives. If z is a zero of h
+itself, (s + z)ⁿ satisfies the relation, and parameters that give this polynomial attain the bound (Blondel,
+Gürbüzbalaban, Megretski and Overton 2012, theorem 7). The relation aₙ = c a0 gives ω0, and the relation a1 = c a0 gives
+the arithmetic mean of the roots.
 """
 
 import itertools
@@ -32,17 +33,17 @@ from tmsopt.program.nlp import objective_size
 from tmsopt.records import Array
 
 PROVEN = 1e-9
-"""A design is proven optimal if its gap is below this share of the size of the roots plus that of the bound."""
+"""A design is proven optimal if its gap is below this share of the size of the roots plus the size of the bound."""
 
-ROUNDING = 1e-15  # relative: of the quotient and of its root
+ROUNDING = 1e-15  # relative rounding error of the quotient and of its root
 _BITS = 212  # working precision: 64 digits for parameters that are exact doubles
-_MOST_FREE = 12  # free parameters: their box has 4096 corners
+_MAX_FREE = 12  # most free parameters, whose box has 4096 corners
 
 _EXTRA_DESIGNS = 8  # designs that check a relation, in addition to those that determine it
-_GRID = 2**40  # steps of a range; a random exact design takes one of them
+_GRID_STEPS = 2**40  # steps of a range, from which random exact designs are chosen
 
 _RATIONAL = {INPUT, CONSTANT, "add", "sub", "neg", "mul", "square", "div", "quotient", "ratio"}
-"""Operations of rational functions; integer powers are allowed too."""
+"""Operations of rational functions; integer powers are also allowed."""
 
 ExactEnds = Mapping[tuple[str, float], Any]
 
@@ -52,26 +53,28 @@ def minimizes_abscissa(problem: Posed) -> bool:
 
 
 def instant_bound(problem: Posed, value: float) -> Bound:
-    """The bound by ω0, or the one by relations of the coefficients if it is better and ω0 leaves a gap."""
-    known = omega0_bound(problem, value)
-    if known.proven or not minimizes_abscissa(problem):
-        return known
-    other = _compare_with_bound(relation_bound(_first_case(problem)), value, "relation", objective_size(problem))
-    return other if other.value > known.value else known
+    """The bound by ω0, or the bound by relations of the coefficients if ω0 leaves a gap and they are better."""
+    product_bound = omega0_bound(problem, value)
+    if product_bound.proven or not minimizes_abscissa(problem):
+        return product_bound
+    linear_bound = _compare_with_bound(
+        relation_bound(_select_first_case(problem)), value, "relation", objective_size(problem)
+    )
+    return linear_bound if linear_bound.value > product_bound.value else product_bound
 
 
 def omega0_bound(problem: Posed, value: float) -> Bound:
     """Lower bound ω0 on the abscissa over the box, without constraints, and the gap of a value to it.
 
-    With scenarios, the bound is for the first one, since the worst case is no better.
+    With scenarios, it is the bound of the first scenario, because the worst case is never better than this.
     """
-    largest = _largest_product(_first_case(problem)) if minimizes_abscissa(problem) else math.inf
+    largest = _bound_product(_select_first_case(problem)) if minimizes_abscissa(problem) else math.inf
     return _compare_with_bound(
         -(largest ** (1 / problem.model.degree)) * (1 + ROUNDING), value, "omega0", objective_size(problem)
     )
 
 
-def _first_case(problem: Posed) -> Posed:
+def _select_first_case(problem: Posed) -> Posed:
     """The problem at its first scenario."""
     if not problem.scenarios:
         return problem
@@ -79,7 +82,7 @@ def _first_case(problem: Posed) -> Posed:
 
 
 def _compare_with_bound(bound: float, value: float, method: str, size: float) -> Bound:
-    """A bound and its gap; no bound if it is infinite or a feasible design contradicts it."""
+    """A bound and its gap; an empty bound if it is infinite or a feasible design contradicts it."""
     if not math.isfinite(bound) or value < bound - PROVEN * (size + abs(bound)):
         return Bound()
     gap = max(value - bound, 0.0)
@@ -91,146 +94,150 @@ def is_gap_closed(gap: float, bound: float, size: float = 1.0) -> bool:
     return gap <= PROVEN * (size + abs(bound))
 
 
-def _largest_product(problem: Posed) -> float:
+def _bound_product(problem: Posed) -> float:
     """Greatest |aₙ/a0| over the box; inf if a0 may vanish or the maximum cannot be enclosed.
 
-    The quotient is monotone along a parameter in which aₙ and a0 are linear, so its extremes are at the ends. At most
-    one other parameter may enter nonlinearly; its stationary points are roots of a polynomial.
+    If aₙ and a0 are linear in a parameter, their quotient is monotone in it, so its extremes are at the ends. At most
+    one parameter may be nonlinear; the stationary points along it are roots of a polynomial.
     """
     model = problem.model
-    if len(problem.free) > _MOST_FREE or not is_rational(model, model.sets[0]):
-        return _enclosed_product(problem)
-    box, known = _algebraic_box(problem)
-    outer = _outer_coefficients(model, tuple(box))
+    if len(problem.free) > _MAX_FREE or not is_rational(model, model.sets[0]):
+        return _enclose_product(problem)
+    box, exact_ends = _build_algebraic_box(problem)
+    outer = _trace_outer_coefficients(model, tuple(box))
     shares = np.random.default_rng(0).random(len(box)).tolist()  # a generic point, where no power vanishes
-    inside = [lo + (hi - lo) * share for (lo, hi), share in zip(box.values(), shares, strict=True)]
+    inner_point = [lo + (hi - lo) * share for (lo, hi), share in zip(box.values(), shares, strict=True)]
     try:
-        through = {n: _restrict_to_line(outer, inside, n) for n, (lo, hi) in box.items() if lo < hi}
+        through = {n: _restrict_to_line(outer, inner_point, n) for n, (lo, hi) in box.items() if lo < hi}
     except (DomainError, TypeError):  # division by a parameter, or by 0 for the fixed ones
-        return _enclosed_product(problem)
+        return _enclose_product(problem)
     varying = {n: max(a.degree() for a in ends) for n, (*ends, turning) in through.items() if turning}
     curved = [n for n, degree in varying.items() if degree > 1]
     if len(curved) > 1:
-        return _enclosed_product(problem)
+        return _enclose_product(problem)
     at = [ends if varying.get(n) == 1 else (sum(ends) / 2,) for n, ends in box.items()]
     points = [*itertools.product(*at)]
     for name in curved:
-        along = [_extremes_along(outer, corner, name, *box[name]) for corner in points]
-        if not all(along):
+        extremes = [_find_extremes(outer, corner, name, *box[name]) for corner in points]
+        if not all(extremes):
             return math.inf
-        points = [*itertools.chain(*along)]
-    return _largest_ratio(outer, dict(zip(box, np.array(points).T, strict=True)), known)
+        points = [*itertools.chain(*extremes)]
+    return _find_largest_ratio(outer, dict(zip(box, np.array(points).T, strict=True)), exact_ends)
 
 
 @lru_cache(maxsize=64)
-def _outer_coefficients(model: Model, names: tuple[str, ...]) -> Formula:
+def _trace_outer_coefficients(model: Model, names: tuple[str, ...]) -> Formula:
     """a0 and aₙ in the algebraic parameters."""
     return trace(lambda x: model.polynomial(**x)[:: model.degree], names)
 
 
-def _enclosed_product(problem: Posed) -> float:
-    """Upper bound of |aₙ/a0| over the box in ball arithmetic; inf if the ball of a0 contains 0."""
+def _enclose_product(problem: Posed) -> float:
+    """Upper bound of |aₙ/a0| over the box in interval arithmetic; inf if the interval of a0 contains 0."""
     with flint.ctx.workprec(_BITS):
         box = {n: ball(ends) for n, ends in problem.free.items()}
-        given = problem.ordered({n: exact(v) for n, v in problem.fixed.items()} | box)
-        return _ratio_upper_end(problem.model.coefficients(given, problem.parameter_set))
+        parameters = problem.ordered({n: exact(v) for n, v in problem.fixed.items()} | box)
+        return _bound_ratio(problem.model.coefficients(parameters, problem.parameter_set))
 
 
-def _ratio_upper_end(a: Sequence[Any]) -> float:
-    """Upper end of the ball of |aₙ/a0|; inf if it may not exist."""
+def _bound_ratio(a: Sequence[Any]) -> float:
+    """Upper end of the interval of |aₙ/a0|; inf if the quotient may not exist."""
     upper = as_ball(abs(quotient(as_ball(a[-1]), as_ball(a[0])))).upper()
     return float(upper) if upper.is_finite() else math.inf
 
 
-def _largest_ratio(outer: Formula, points: Mapping[str, Array], known: ExactEnds) -> float:
+def _find_largest_ratio(outer: Formula, points: Mapping[str, Array], exact_ends: ExactEnds) -> float:
     """Greatest |aₙ/a0| over the points; inf unless a0 has one sign at all of them.
 
-    Where both vanish, the quotient is constant along the adjacent edges. The largest quotients are computed again in
-    balls, because a small a0 loses digits to cancellation in doubles.
+    Where both coefficients are 0, the quotient is constant along the adjacent edges. The largest quotients are computed
+    again in interval arithmetic, because in doubles a small a0 loses digits by cancellation.
     """
     first, last, *_ = np.broadcast_arrays(*values(outer, points), *points.values())
-    both = (last == 0) & (first == 0)
-    if set(np.sign(first[~both]).tolist()) not in ({-1.0}, {1.0}):
+    are_zero = (last == 0) & (first == 0)
+    if set(np.sign(first[~are_zero]).tolist()) not in ({-1.0}, {1.0}):
         return math.inf
     with np.errstate(over="ignore"):
-        quotients = np.where(both, 0.0, np.abs(last / np.where(both, 1.0, first)))
+        quotients = np.where(are_zero, 0.0, np.abs(last / np.where(are_zero, 1.0, first)))
     with flint.ctx.workprec(_BITS):
         for k in np.flatnonzero(quotients >= quotients.max() / 2):
             at = {n: float(column[k]) for n, column in points.items()}
-            quotients[k] = _ratio_upper_end(values(outer, {n: known.get((n, x), exact(x)) for n, x in at.items()}))
+            quotients[k] = _bound_ratio(values(outer, {n: exact_ends.get((n, x), exact(x)) for n, x in at.items()}))
     return float(quotients.max())
 
 
 def _restrict_to_line(outer: Formula, point: Sequence[float], name: str) -> tuple[Any, Any, Any]:
-    """a0, aₙ and the numerator of (aₙ/a0)′ as polynomials in one parameter, the others fixed at a point."""
+    """a0, aₙ and the numerator of (aₙ/a0)′ as polynomials in one parameter; the others are fixed at a point."""
     at = dict(zip(outer.names, map(exact, point), strict=True)) | {name: flint.fmpq_poly([0, 1])}
     first, last = (flint.fmpq_poly([1]) * a for a in fold(outer, at, BALLS))
     return first, last, last.derivative() * first - last * first.derivative()
 
 
-def _extremes_along(outer: Formula, corner: Sequence[float], name: str, *ends: float) -> list[tuple[float, ...]]:
-    """The ends and stationary points along the nonlinear parameter from a corner; empty if there is a pole."""
+def _find_extremes(outer: Formula, corner: Sequence[float], name: str, *ends: float) -> list[tuple[float, ...]]:
+    """The ends and stationary points along the nonlinear parameter from a corner; empty if the line has a pole."""
     first, _, turning = _restrict_to_line(outer, corner, name)
-    poles, inside = (
+    poles, turning_points = (
         [z.real for z, _ in p.complex_roots() if z.imag == 0 and not (z.real < ends[0] or z.real > ends[1])]
         for p in (first, turning)
     )
     if poles:
         return []
-    places = (*ends, *(min(max(float(x), ends[0]), ends[1]) for x in inside))
+    places = (*ends, *(min(max(float(x), ends[0]), ends[1]) for x in turning_points))
     return [tuple(x if n == name else c for n, c in zip(outer.names, corner, strict=True)) for x in places]
 
 
-def _algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]], ExactEnds]:
-    """Range of each algebraic parameter in doubles, and the exact balls of its ends.
+def _build_algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]], ExactEnds]:
+    """Range of each algebraic parameter in doubles, and the exact intervals of its ends.
 
-    Algebraic parameters are monotone in each parameter of a set, so corners suffice; √(1 + T²) is so on either side of
-    an upright axis, which is therefore a corner too.
+    Algebraic parameters are monotone in each parameter of a set, so the corners of the box are enough. √(1 + T²) is
+    monotone only on each side of an upright axis, so the upright axis is also a corner.
     """
-    of = problem.parameter_set
-    ends = {p.name: problem.free.get(p.name) or (problem.fixed[p.name],) for p in of.parameters}
-    ends |= {p.name: (*e, 0.0) for p in of.parameters if p.tangent and min(e := ends[p.name]) < 0 < max(e)}
-    corners = np.array(list(itertools.product(*(ends[n] for n in of.names))))
-    doubles = problem.model.algebraic(of.native(dict(zip(of.names, corners.T, strict=True))))
+    parameter_set = problem.parameter_set
+    ends = {p.name: problem.free.get(p.name) or (problem.fixed[p.name],) for p in parameter_set.parameters}
+    ends |= {p.name: (*e, 0.0) for p in parameter_set.parameters if p.tangent and min(e := ends[p.name]) < 0 < max(e)}
+    corners = np.array(list(itertools.product(*(ends[n] for n in parameter_set.names))))
+    doubles = problem.model.algebraic(parameter_set.native(dict(zip(parameter_set.names, corners.T, strict=True))))
 
     @cache
     def balls(k: int) -> dict[str, Any]:
         with flint.ctx.workprec(_BITS):
-            return problem.model.algebraic(of.native(dict(zip(of.names, map(exact, corners[k].tolist()), strict=True))))
+            return problem.model.algebraic(
+                parameter_set.native(dict(zip(parameter_set.names, map(exact, corners[k].tolist()), strict=True)))
+            )
 
-    box, known = {}, dict[tuple[str, float], Any]()
-    for n, given in doubles.items():
-        column = np.broadcast_to(np.asarray(given, dtype=float), len(corners))
+    box, exact_ends = {}, dict[tuple[str, float], Any]()
+    for n, corner_values in doubles.items():
+        column = np.broadcast_to(np.asarray(corner_values, dtype=float), len(corners))
         least, greatest = int(column.argmin()), int(column.argmax())
         box[n] = float(column[least]), float(column[greatest])
-        known |= {(n, box[n][0]): balls(least)[n], (n, box[n][1]): balls(greatest)[n]}
-    return box, known
+        exact_ends |= {(n, box[n][0]): balls(least)[n], (n, box[n][1]): balls(greatest)[n]}
+    return box, exact_ends
 
 
 @lru_cache(maxsize=64)
 def relation_bound(problem: Posed) -> float:
     """The greatest lower bound on the abscissa by linear relations of the coefficients; −inf without relations.
 
-    It ignores constraints and the ranges of the free parameters. The coefficients must be rational functions of the
-    free parameters (tangents of angles). Relations are found in exact arithmetic at random designs, and must hold at
-    more designs than determine them.
+    The bound ignores constraints and the ranges of the free parameters. The coefficients must be rational functions of
+    the free parameters (for angles, of their tangents). Relations are found in exact arithmetic at random designs, and
+    they must also hold at further random designs.
     """
-    rows = _exact_rows(problem) if is_rational(problem.model, problem.parameter_set) else None
+    rows = _sample_exact_rows(problem) if is_rational(problem.model, problem.parameter_set) else None
     if not rows:
         return -math.inf
     # Independent b with Σ b_k a_k = 0, reduced from the leading coefficient on and from the last one.
-    reduced = [*_null_space(rows), *(b[::-1] for b in _null_space([row[::-1] for row in rows]))]
+    reduced = [*_compute_null_space(rows), *(b[::-1] for b in _compute_null_space([row[::-1] for row in rows]))]
     with flint.ctx.workprec(_BITS):
-        return max(map(_bound_from_relation, reduced), default=-math.inf)
+        return max(map(_bound_by_relation, reduced), default=-math.inf)
 
 
 @lru_cache(maxsize=64)
-def is_rational(model: Model, of: ParameterSet) -> bool:
+def is_rational(model: Model, parameter_set: ParameterSet) -> bool:
     """Whether the coefficients are rational functions of the parameters, or of tangents of those that are angles."""
-    tangents = {p.name for p in of.parameters if p.tangent}
+    tangents = {p.name for p in parameter_set.parameters if p.tangent}
     coefficients = trace(
-        lambda x: model.coefficients({n: make_node("atan", s) if n in tangents else s for n, s in x.items()}, of),
-        of.names,
+        lambda x: model.coefficients(
+            {n: make_node("atan", s) if n in tangents else s for n, s in x.items()}, parameter_set
+        ),
+        parameter_set.names,
     )
     wholes = {k for k, s in enumerate(coefficients.steps) if isinstance(s.value, Fraction) and s.value.denominator == 1}
     powers = [s for s in coefficients.steps if s.op == "pow" and s.operands[1] in wholes]
@@ -238,7 +245,7 @@ def is_rational(model: Model, of: ParameterSet) -> bool:
     return len(powers) + len(rational) == len(coefficients.steps)
 
 
-def _null_space(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
+def _compute_null_space(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
     """Reduced basis of the null space of the rows."""
     reduced, rank = flint.fmpq_mat([list(row) for row in rows]).rref()
     width = range(len(rows[0]))
@@ -250,8 +257,8 @@ def _null_space(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
     ]
 
 
-def _bound_from_relation(relation: Sequence[Any]) -> float:
-    """−z, with z the largest real zero of h and its derivatives; −inf for the relation a0 = 0."""
+def _bound_by_relation(relation: Sequence[Any]) -> float:
+    """−z, where z is the largest real zero of h and its derivatives; −inf for the relation a0 = 0."""
     n = len(relation) - 1
     h: Any = flint.fmpq_poly([b * math.comb(n, k) for k, b in enumerate(relation)])
     zeros: list[float] = []
@@ -262,18 +269,18 @@ def _bound_from_relation(relation: Sequence[Any]) -> float:
     return math.nextafter(-largest, -math.inf) if largest else 0.0
 
 
-def _exact_rows(problem: Posed) -> list[list[Any]] | None:
+def _sample_exact_rows(problem: Posed) -> list[list[Any]] | None:
     """Coefficients at random designs of the box; None if a coefficient is not a fraction."""
-    of, rng, rows = problem.parameter_set, np.random.default_rng(0), []
-    if any(of[n].tangent and v != 0 for n, v in problem.fixed.items()):
+    parameter_set, rng, rows = problem.parameter_set, np.random.default_rng(0), []
+    if any(parameter_set[n].tangent and v != 0 for n, v in problem.fixed.items()):
         return None
     for _ in range(problem.model.degree + 1 + _EXTRA_DESIGNS):
-        drawn: dict[str, Any] = {}
+        design: dict[str, Any] = {}
         for n, ends in problem.ordered({**{n: (v, v) for n, v in problem.fixed.items()}, **problem.free}).items():
-            lower, upper = (exact(math.tan(e)) if of[n].tangent else exact(e) for e in ends)
-            at = lower + (upper - lower) * flint.fmpq(int(rng.integers(_GRID)), _GRID)
-            drawn[n] = Tilt(at) if of[n].tangent else at
-        row = problem.model.coefficients(drawn, of)
+            lower, upper = (exact(math.tan(e)) if parameter_set[n].tangent else exact(e) for e in ends)
+            at = lower + (upper - lower) * flint.fmpq(int(rng.integers(_GRID_STEPS)), _GRID_STEPS)
+            design[n] = Tilt(at) if parameter_set[n].tangent else at
+        row = problem.model.coefficients(design, parameter_set)
         if not all(isinstance(c, flint.fmpq) for c in row):
             return None
         rows.append(row)

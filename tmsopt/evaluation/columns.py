@@ -1,7 +1,7 @@
 """Evaluates many designs of a problem without free parameters at once, in arrays of doubles with error bounds.
 
-The results equal those of `recheck` and `certified_numbers`. Designs in doubt are left to these: a nearly multiple
-root, a limit missed by little more than the tolerance, a coefficient that does not exist.
+The results equal the results of `recheck` and `certified_numbers`. These two evaluate the doubtful designs: with a
+nearly multiple root, with a limit missed by little more than the tolerance, or with an undefined coefficient.
 """
 
 import math
@@ -25,13 +25,13 @@ from tmsopt.records import Array, Truth
 from tmsopt.roots.discs import Motions, enclose_motions
 
 BLOCK = 8192
-"""Designs per block, so that their numbers stay in the cache. Results do not depend on it."""
+"""Designs per block, so that their numbers stay in the cache. Results do not depend on the size of a block."""
 
 KNOWN = 5e-10
-"""Relative error above which a design is left to the recheck, so that numbers agree to 1e-9."""
+"""Relative error above which the recheck must evaluate a design, so that numbers agree to 1e-9."""
 
-_UNIT = 2.0**-53  # relative rounding of a parameter
-_DOUBT = 2.0  # a limit within so many tolerances is left to the recheck
+_UNIT_ROUNDING = 2.0**-53  # relative rounding error of a parameter
+_DOUBT_RATIO = 2.0  # if a limit is missed by at most this many tolerances, the recheck must evaluate the design
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,10 @@ class Columns:
 
     Attributes:
         certain: whether the other values are valid for this design.
-        objective, abscissa, damping_ratio: as in `Solution`; the abscissa as stored is the same.
+        objective, abscissa, damping_ratio: as in `Solution`; the abscissa as stored is the same as the abscissa.
         oscillates: whether the structure is ``pair``; otherwise it is ``real``.
-        violations: name of a constraint → amount of the violation, nan if it is met.
-        bound, gap: for feasible designs; no gap is closed.
+        violations: name of a constraint → amount of the violation; nan if the constraint is satisfied.
+        bound, gap: the lower bound and the gap of feasible designs; no gap is closed.
         by_relation: whether the bound comes from relations of the coefficients.
         laws: label → relative residual, nan where the law does not apply.
         reports: expression → its value.
@@ -65,11 +65,11 @@ class Columns:
 def can_evaluate_columns(problem: Posed) -> bool:
     """Whether `evaluate_columns` handles a problem.
 
-    The problem has no free parameters, cases or pattern, a real model, and names neither the robustness radius nor the
-    angular frequency.
+    The problem may not have free parameters, cases, a pattern or a complex model. It may not use the robustness radius
+    or the angular frequency.
     """
-    listed = problem.free or problem.scenarios or problem.tolerances or problem.model.carrier is not None
-    return not (listed or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
+    excluded = problem.free or problem.scenarios or problem.tolerances or problem.model.carrier is not None
+    return not (excluded or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
 
 
 def evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str] = ()) -> Columns | None:
@@ -77,7 +77,7 @@ def evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Sequ
 
     Args:
         columns: parameter → its values, one per design, at least one.
-        reports: expressions to evaluate in addition.
+        reports: further expressions to evaluate.
     """
     try:
         with np.errstate(all="ignore"):
@@ -87,13 +87,14 @@ def evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Sequ
 
 
 def _evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Sequence[str]) -> Columns:
-    fixed = {n: np.float64(x) for n, x in problem.ordered({}).items()}  # whose comparisons are arrays' too
-    given = fixed | dict(columns)
+    # comparisons of NumPy numbers give arrays
+    fixed_numbers = {n: np.float64(x) for n, x in problem.ordered({}).items()}
+    parameters = fixed_numbers | dict(columns)
     m = len(next(iter(columns.values())))
-    wide = {n: Bounded(x, np.abs(x) * _UNIT) for n, x in given.items()}
-    coefficients = [_broadcast(c, m) for c in coefficients_of(problem, wide)]
-    found = enclose_motions(coefficients, STRUCTURE_TOLERANCE)
-    certain = found.simple & _is_possible(problem, given)
+    bounded = {n: Bounded(x, np.abs(x) * _UNIT_ROUNDING) for n, x in parameters.items()}
+    coefficients = [_broadcast(c, m) for c in coefficients_of(problem, bounded)]
+    motions = enclose_motions(coefficients, STRUCTURE_TOLERANCE)
+    certain = motions.simple & _is_possible(problem, parameters)
 
     def round_or_doubt(number: Any) -> Array:
         nonlocal certain
@@ -101,25 +102,27 @@ def _evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Seq
         certain = certain & (spread.is_known_within(KNOWN) | ((spread.value == 0) & (spread.error == 0)))
         return np.asarray(spread.value)
 
-    wide |= {"abscissa": found.abscissa, "damping_ratio": found.damping_ratio}
+    bounded |= {"abscissa": motions.abscissa, "damping_ratio": motions.damping_ratio}
     objective = (
-        round_or_doubt(*evaluate(problem, [problem.objective], wide)) if problem.objective else np.full(m, np.nan)
+        round_or_doubt(*evaluate(problem, [problem.objective], bounded)) if problem.objective else np.full(m, np.nan)
     )
-    doubles = {name: round_or_doubt(wide[name]) for name in ("abscissa", "damping_ratio")}
-    plain = given | doubles | {ANGULAR_FREQUENCY: found.frequency}
-    violations, doubt = _find_violations(problem, plain, found)
-    certain &= ~doubt & (np.abs(doubles["abscissa"]) > found.scatter)
+    doubles = {name: round_or_doubt(bounded[name]) for name in ("abscissa", "damping_ratio")}
+    plain = parameters | doubles | {ANGULAR_FREQUENCY: motions.frequency}
+    violations, doubt = _find_violations(problem, plain, motions)
+    certain &= ~doubt & (np.abs(doubles["abscissa"]) > motions.scatter)
     feasible = np.all(np.isnan([np.full(m, np.nan), *violations.values()]), axis=0)
     bound, related = _find_bounds(problem, coefficients, round_or_doubt)
     bound = np.where(feasible, bound, -np.inf)
-    certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT * PROVEN * (1.0 + np.abs(bound))))
-    residuals = _law_residuals(problem, wide, coefficients, feasible, round_or_doubt) if problem.model is tms else {}
+    certain &= ~(np.isfinite(bound) & (objective - bound <= _DOUBT_RATIO * PROVEN * (1.0 + np.abs(bound))))
+    residuals = (
+        _compute_law_residuals(problem, bounded, coefficients, feasible, round_or_doubt) if problem.model is tms else {}
+    )
     return Columns(
         certain,
         objective,
         doubles["abscissa"],
         doubles["damping_ratio"],
-        found.oscillates,
+        motions.oscillates,
         violations,
         bound,
         np.where(np.isfinite(bound), np.maximum(objective - bound, 0.0), np.inf),
@@ -131,38 +134,42 @@ def _evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Seq
 
 def _broadcast(number: Any, m: int) -> Bounded:
     """A number as a column with one value per design."""
-    wide = as_bounded(number)
-    return Bounded(*(np.ascontiguousarray(np.broadcast_to(x, m), dtype=float) for x in (wide.value, wide.error)))
+    bounded = as_bounded(number)
+    return Bounded(*(np.ascontiguousarray(np.broadcast_to(x, m), dtype=float) for x in (bounded.value, bounded.error)))
 
 
-def _is_possible(problem: Posed, given: Mapping[str, Any]) -> Truth:
-    """Whether a design is valid: parameters are in their ranges, and no angle is 0, as rational bounds require."""
-    of, possible = problem.parameter_set, np.True_
-    for p in of.parameters:
-        x, inside = given[p.name], p.range
-        low, high = (x >= inside.lower, x <= inside.upper) if inside.closed else (x > inside.lower, x < inside.upper)
+def _is_possible(problem: Posed, parameters: Mapping[str, Any]) -> Truth:
+    """Whether each design is valid: its parameters are in their ranges, and no angle is 0, as bounds require."""
+    parameter_set, possible = problem.parameter_set, np.True_
+    for p in parameter_set.parameters:
+        x, allowed_range = parameters[p.name], p.range
+        above_lower, below_upper = (
+            (x >= allowed_range.lower, x <= allowed_range.upper)
+            if allowed_range.closed
+            else (x > allowed_range.lower, x < allowed_range.upper)
+        )
         size = np.abs(x)
-        possible = possible & low & high & (((size >= SMALLEST) & (size <= 1 / SMALLEST)) | (x == 0))
+        possible = possible & above_lower & below_upper & (((size >= SMALLEST) & (size <= 1 / SMALLEST)) | (x == 0))
         possible = possible & ~(p.tangent & (x == 0))
-    for name, (other, _) in of.needs.items():
-        possible = possible & ((given[name] == 0) | (given[other] > 0))
+    for name, (needed_name, _) in parameter_set.needs.items():
+        possible = possible & ((parameters[name] == 0) | (parameters[needed_name] > 0))
     return np.asarray(possible)
 
 
-def _find_violations(problem: Posed, given: Mapping[str, Any], found: Motions) -> tuple[dict[str, Array], Truth]:
-    """The violation of each constraint, and which designs are too close to a limit to decide here."""
-    m = len(found.simple)
+def _find_violations(problem: Posed, parameters: Mapping[str, Any], motions: Motions) -> tuple[dict[str, Array], Truth]:
+    """The violation of each constraint, and which designs are too close to a limit for this evaluation."""
+    m = len(motions.simple)
     amounts, doubt = {}, np.zeros(m, dtype=bool)
     names = list(dict.fromkeys(n for c in problem.conditions.values() for n in c.names))
-    values = dict(zip(names, evaluate(problem, names, given), strict=True))
+    values = dict(zip(names, evaluate(problem, names, parameters), strict=True))
     for name, condition in problem.conditions.items():
         left, right = (_broadcast(side, m).value for side in condition.sides(values))
         difference = left - right
         excess, size = condition.excess(difference), np.maximum(1.0, np.maximum(np.abs(left), np.abs(right)))
         relative = excess / size
-        doubt |= ~np.isfinite(difference) | ((relative > 0) & (relative <= _DOUBT * FEASIBLE))
+        doubt |= ~np.isfinite(difference) | ((relative > 0) & (relative <= _DOUBT_RATIO * FEASIBLE))
         if set(condition.names) & set(ROOT_NAMES):  # the recheck uses numeric roots
-            doubt |= np.abs(difference) <= (_DOUBT * FEASIBLE + found.scatter) * size
+            doubt |= np.abs(difference) <= (_DOUBT_RATIO * FEASIBLE + motions.scatter) * size
         amounts[name] = np.where(relative > FEASIBLE, excess, np.nan)
     return amounts, doubt
 
@@ -175,15 +182,19 @@ def _find_bounds(
     Fixed coefficients satisfy relations in pairs: aⱼ with a0, where aⱼ/a0 = C(n, j) zʲ gives the bound, and aⱼ with aₙ.
 
     Args:
-        round_or_doubt: rounds numbers to doubles and marks the designs where this is uncertain.
+        round_or_doubt: rounds numbers to doubles, and marks the designs for which the rounding is uncertain.
     """
-    model, of, n = problem.model, problem.parameter_set, problem.model.degree
-    known = np.full(len(coefficients[0].value), -np.inf)
+    model, parameter_set, n = problem.model, problem.parameter_set, problem.model.degree
+    product_bound = np.full(len(coefficients[0].value), -np.inf)
     if minimizes_abscissa(problem):
-        known = -(round_or_doubt(abs(coefficients[-1] / coefficients[0])) ** (1 / n)) * (1 + ROUNDING)
-    if not minimizes_abscissa(problem) or any(p.tangent for p in of.parameters) or not is_rational(model, of):
-        return known, np.zeros(len(known), dtype=bool)
-    least = np.full(len(known), np.inf)
+        product_bound = -(round_or_doubt(abs(coefficients[-1] / coefficients[0])) ** (1 / n)) * (1 + ROUNDING)
+    if (
+        not minimizes_abscissa(problem)
+        or any(p.tangent for p in parameter_set.parameters)
+        or not is_rational(model, parameter_set)
+    ):
+        return product_bound, np.zeros(len(product_bound), dtype=bool)
+    least = np.full(len(product_bound), np.inf)
     for j in range(n + 1):
         up, down = coefficients[j] / coefficients[0] / math.comb(n, j), coefficients[n] / coefficients[j]
         for power, ratio, linear in ((j, up, j == 1), (n - j, down * math.comb(n, j), n == 1)):
@@ -191,13 +202,13 @@ def _find_bounds(
                 root = ratio.root(power)
                 zero = round_or_doubt(root) + root.error
                 least = np.minimum(least, zero if linear else np.maximum(zero, 0.0))  # 0 is a zero of a derivative
-    other = np.nextafter(-least, -np.inf)
-    return np.maximum(other, known), other > known
+    linear_bound = np.nextafter(-least, -np.inf)
+    return np.maximum(linear_bound, product_bound), linear_bound > product_bound
 
 
-def _law_residuals(
+def _compute_law_residuals(
     problem: Posed,
-    wide: Mapping[str, Any],
+    bounded: Mapping[str, Any],
     coefficients: Sequence[Bounded],
     feasible: Truth,
     round_or_doubt: Callable[[Any], Array],
@@ -205,15 +216,15 @@ def _law_residuals(
     """Relative residuals of the laws that apply to a feasible design without a multiple root; see `law_rows`."""
     m = len(feasible)
     names = problem.model.sets[0].names
-    *native, number = (_broadcast(x, m) for x in evaluate(problem, [*names, "Fr_c"], wide))
+    *native, number = (_broadcast(x, m) for x in evaluate(problem, [*names, "Fr_c"], bounded))
     p = {n: round_or_doubt(x) for n, x in zip(names, native, strict=True)}
     exists = np.isfinite(number.value)
     critical = np.where(exists, round_or_doubt(number.where(exists, Bounded(np.ones(m), np.zeros(m)))), np.nan)
-    found = {}
+    residuals = {}
     for label, (numeric, law, applies) in speed_laws(
         p, critical, np.stack([*map(round_or_doubt, coefficients)], -1)
     ).items():
         residual = (numeric - law) / np.where(law == 0, 1.0, np.abs(law))
         round_or_doubt(np.where(feasible & applies, residual, 0.0))  # a law without a value
-        found[label] = np.where(feasible & applies, residual, np.nan)
-    return found
+        residuals[label] = np.where(feasible & applies, residual, np.nan)
+    return residuals

@@ -1,4 +1,4 @@
-"""Proves by interval arithmetic that no design in the box meets the limits."""
+"""Proves by interval arithmetic that no design in the box satisfies the limits."""
 
 import math
 
@@ -17,8 +17,8 @@ _MARGIN = 10 * FEASIBLE
 def bound_without_search(problem: Posed, status: str = "infeasible", value: float = math.nan) -> Bound:
     """The bound on an optimum by `instant_bound`, or the proof that some limit is met nowhere in the box.
 
-    Limits on single parameters first narrow the box, so two that exclude each other are found too. Limits on the roots
-    are ignored.
+    Limits on single parameters first narrow the box, so that two contradictory limits are also found. Limits on the
+    roots are ignored.
     """
     if status == "optimal":
         return instant_bound(problem, value)
@@ -35,23 +35,23 @@ def _is_box_excluded(problem: Posed) -> bool:
             continue
         (low, high), limit, side = free[parameter], limit_value(text), limit_side(text, parameter)
         if limit is not None and side:
-            off = problem.tolerances.get(parameter, 0.0)
+            tolerance = problem.tolerances.get(parameter, 0.0)
             below = side * condition.sign > 0
-            free[parameter] = (low, min(high, limit - off)) if below else (max(low, limit + off), high)
+            free[parameter] = (low, min(high, limit - tolerance)) if below else (max(low, limit + tolerance), high)
     if any(low > high + _MARGIN * max(1.0, abs(low), abs(high)) for low, high in free.values()):
         return True
     box = {n: (min(ends), max(ends)) for n, ends in free.items()}
-    inside = {n: ends for n, ends in box.items() if ends[0] < ends[1]}
-    fixed = {**problem.fixed, **{n: ends[0] for n, ends in box.items() if n not in inside}}
-    build = Builder(problem.derive(free=inside, fixed=fixed, start={}), problem.cases[:1])
+    free_ranges = {n: ends for n, ends in box.items() if ends[0] < ends[1]}
+    fixed = {**problem.fixed, **{n: ends[0] for n, ends in box.items() if n not in free_ranges}}
+    build = Builder(problem.derive(free=free_ranges, fixed=fixed, start={}), problem.cases[:1])
     build.add_constraints(without=problem.asked_of_roots)
     if not build.rows:
         return False
     try:
-        found = build.enclose([row[1] for row in build.rows])
+        row_ranges = build.enclose([row[1] for row in build.rows])
     except UnsupportedOperation:
         return False
     return any(
-        least > high + _MARGIN * max(1.0, abs(high)) or most < low - _MARGIN * max(1.0, abs(low))
-        for (least, most), (_, _, low, high) in zip(found, build.rows, strict=True)
+        least > high + _MARGIN * max(1.0, abs(high)) or greatest < low - _MARGIN * max(1.0, abs(low))
+        for (least, greatest), (_, _, low, high) in zip(row_ranges, build.rows, strict=True)
     )

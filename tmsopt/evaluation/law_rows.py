@@ -12,7 +12,7 @@ from tmsopt.problem.solution import Solution
 from tmsopt.records import plain
 from tmsopt.roots import is_stable
 
-_CLOSED = "a1a3, a2, w0"  # equations that give several parameters
+_CLOSED_FORM = "a1a3, a2, w0"  # label of the equations that give several parameters
 LAWS = (
     "w0",
     "4poly",
@@ -34,7 +34,7 @@ LAWS = (
 """Names of all laws, in the order of `law_rows`."""
 
 SAME_LAW = 1e-9
-"""Number and law agree up to this relative difference; coefficients are matched to 1e-10."""
+"""Largest relative difference between a number and a law that agree; coefficients agree to 1e-10."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ class LawRow:
     Attributes:
         label: equation label in the paper.
         subject: the quantity compared.
-        numeric: its value for the design, computed without the law.
-        law: its value by the law.
-        reason: why the law does not apply to this design; empty if it does.
+        numeric: value of the subject for the design, computed without the law.
+        law: value of the subject by the law.
+        reason: why the law does not apply to this design; empty if the law applies.
     """
 
     label: str
@@ -58,7 +58,9 @@ class LawRow:
     @property
     def name(self) -> str:
         """The label without commas, followed by the subject if the equation gives several parameters."""
-        return f"{self.label} {self.subject.split(',')[0]}".replace(",", "") if self.label == _CLOSED else self.label
+        return (
+            f"{self.label} {self.subject.split(',')[0]}".replace(",", "") if self.label == _CLOSED_FORM else self.label
+        )
 
     @property
     def applies(self) -> bool:
@@ -82,15 +84,15 @@ class LawRow:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
-        found = plain(self, "label subject numeric law residual relative applies agrees reason")
-        return found if self.applies else found | {"residual": None, "relative": None}
+        data = plain(self, "label subject numeric law residual relative applies agrees reason")
+        return data if self.applies else data | {"residual": None, "relative": None}
 
 
 def law_rows(design: Solution) -> Iterator[LawRow]:
-    """Every law, with the reason if it does not apply."""
+    """Every law, with a reason if it does not apply to the design."""
     p = {name: float(value) for name, value in design.dimensionless.items()}
-    heights, tilted = _heights(p), _heights(p, "lambda_s")
-    not_ep4 = "" if design.structure == "EP4" else f"holds at EP4; {_why_not_ep4(design)}"
+    heights, tilted = _select_parameters(p), _select_parameters(p, "lambda_s")
+    not_ep4 = "" if design.structure == "EP4" else f"holds at EP4; {_explain_missing_ep4(design)}"
     not_one = "" if p["chi_H"] == 1 else f"needs chi_H = 1; here chi_H = {p['chi_H']:.6g}"
     r, T = design.abscissa, math.tan(p["lambda_s"])
     a = np.array([design.quantities[f"a{k}"] for k in range(5)])
@@ -108,23 +110,22 @@ def law_rows(design: Solution) -> Iterator[LawRow]:
 
     general = not_ep4 or ("" if not_one else "at chi_H = 1 the mass ratio is free; see the laws for chi_H = 1")
     branches = laws.ep4(r, **heights, chi_H=p["chi_H"])
-    branch = min(
-        branches, key=lambda b: abs(float(b.tan_lambda_s) - T) + abs(float(b.Fr) - p["Fr"])
-    )  # nearest to the design
+    # the branch of the law that is nearest to the design
+    branch = min(branches, key=lambda b: abs(float(b.tan_lambda_s) - T) + abs(float(b.Fr) - p["Fr"]))
     closed = (("Fr", p["Fr"], branch.Fr), ("mu", p["mu"], branch.mu), ("tan(lambda_s)", T, branch.tan_lambda_s))
     for subject, numeric, law in closed:
-        yield row(_CLOSED, f"{subject}, closed form for any chi_H", numeric, law, general)
+        yield row(_CLOSED_FORM, f"{subject}, closed form for any chi_H", numeric, law, general)
 
     critical = design.quantities["Fr_c"]
     absent = "" if math.isfinite(critical) else "the design has no weave boundary"
     low = "incomplete for chi_H < 1: a1 > 0 is missing" if p["chi_H"] < 1 else ""
-    off = f"holds at chi_B = {float(laws.chibm(**heights)):.6g}"
+    off_optimum = f"holds at chi_B = {float(laws.chibm(**heights)):.6g}"
     of_speed = speed_laws(p, critical, a)
     for label, subject, reason in (
         ("lscf", "stable (1) or not (0)", low if p["lambda_s"] > 0 else "stated for lambda_s > 0"),
         ("flus", "Fr_c", absent),
         ("Frc1", "Fr_c", not_one or absent),
-        ("frm", "Fr_c, least over chi_B", not_one or absent or off),
+        ("frm", "Fr_c, least over chi_B", not_one or absent or off_optimum),
     ):
         numeric, law, applies = of_speed[label]
         yield row(label, subject, numeric, law, "" if applies else reason)
@@ -140,14 +141,16 @@ def law_rows(design: Solution) -> Iterator[LawRow]:
 
 
 def speed_laws(p: Mapping[str, Any], critical: Any, coefficients: Any) -> dict[str, tuple[Any, Any, Any]]:
-    """Laws of stability and of the critical Froude number: label → number of the design, law, whether it applies.
+    """Laws of stability and of the critical Froude number: label → design's number, law's number, whether it applies.
 
     Args:
         p: dimensionless parameters, numbers or arrays.
         coefficients: shape (…, 5).
     """
-    heights, tilted, shape = (_heights(p, *more) for more in ((), ("lambda_s",), ("lambda_s", "mu", "chi_B", "chi_H")))
-    exists, one = np.isfinite(critical), p["chi_H"] == 1
+    heights, tilted, shape = (
+        _select_parameters(p, *names) for names in ((), ("lambda_s",), ("lambda_s", "mu", "chi_B", "chi_H"))
+    )
+    exists, has_unit_height = np.isfinite(critical), p["chi_H"] == 1
     best = laws.chibm(**heights)
     optimal = np.abs(p["chi_B"] - best) <= SAME_LAW * np.maximum(np.abs(p["chi_B"]), np.abs(best))
     printed = np.all(laws.lscf(p["Fr"], **shape), axis=0)
@@ -155,19 +158,19 @@ def speed_laws(p: Mapping[str, Any], critical: Any, coefficients: Any) -> dict[s
     return {
         "lscf": (1.0 * is_stable(coefficients), 1.0 * printed, (p["lambda_s"] > 0) & (p["chi_H"] >= 1)),
         "flus": (critical, laws.Fr_c(**shape), exists),
-        "Frc1": (critical, first, one & exists),
-        "frm": (critical, laws.frm(**tilted), one & exists & optimal),
+        "Frc1": (critical, first, has_unit_height & exists),
+        "frm": (critical, laws.frm(**tilted), has_unit_height & exists & optimal),
     }
 
 
-def _heights(p: Mapping[str, Any], *more: str) -> dict[str, Any]:
-    """The parameters zeta_B and zeta_H, and more by name."""
-    return {n: p[n] for n in ("zeta_B", "zeta_H", *more)}
+def _select_parameters(p: Mapping[str, Any], *names: str) -> dict[str, Any]:
+    """The parameters zeta_B and zeta_H, and further parameters by name."""
+    return {n: p[n] for n in ("zeta_B", "zeta_H", *names)}
 
 
-def _why_not_ep4(design: Solution) -> str:
+def _explain_missing_ep4(design: Solution) -> str:
     binding = ", ".join(design.active)
-    why = f" because {binding} bind{'s' if len(design.active) == 1 else ''}" if binding else ""
+    reason = f" because {binding} bind{'s' if len(design.active) == 1 else ''}" if binding else ""
     if not design.problem.free:
-        why = " and nothing is free"
-    return f"the structure is '{design.structure}'{why}"
+        reason = " and nothing is free"
+    return f"the structure is '{design.structure}'{reason}"

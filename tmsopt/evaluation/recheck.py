@@ -1,4 +1,4 @@
-"""Evaluates a design from its parameters alone, independently of the program that produced it."""
+"""Evaluates a design from its parameters only, independently of the program that produced it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,12 +24,12 @@ from tmsopt.records import Numbers, Table
 from tmsopt.roots import Structure, pattern_distance
 
 FEASIBLE = 1e-9
-"""A constraint counts as met up to this violation, relative to the size of its two sides or 1."""
+"""Largest violation of a constraint that counts as satisfied, relative to the size of its two sides or 1."""
 
 MATCHED = 1e-10
-"""A pattern counts as located up to this relative change of a coefficient."""
+"""Largest relative change of a coefficient for which a pattern counts as located."""
 
-_SCATTER = 2e-3  # relative: five times the error of numeric roots next to a 4-fold root
+_ROOT_SCATTER = 2e-3  # five times the relative error of numeric roots next to a 4-fold root
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class Evaluation:
     """A design's roots, objective and violations, in its worst case if it has several.
 
     Attributes:
-        violations: name → violation relative to the size of the two sides, if above tolerance.
-        amounts: name → violation in the units of the sides.
+        violations: name of a constraint → violation relative to the size of its two sides, if above the tolerance.
+        amounts: name of a constraint → violation in the units of its sides.
         worst: the evaluated case with the largest abscissa.
         least_damped: the case with the least damping ratio.
         fastest: the case with the greatest angular frequency, if the problem uses it.
         robustness: the boundaries nearest to the design, if the problem uses the robustness radius.
-        crossing: whether only the eigenvectors violate the pattern: the roots are equal, the Jordan chains too short.
+        crossing: whether the roots satisfy the pattern, but the eigenvectors do not: Jordan chains are too short.
     """
 
     structure: Structure
@@ -61,22 +61,19 @@ class Evaluation:
 
 
 def recheck(
-    problem: Posed,
-    parameters: Numbers,
-    cases: Sequence[Case] | None = None,
-    robustness: Robustness | None = None,
+    problem: Posed, parameters: Numbers, cases: Sequence[Case] | None = None, robustness: Robustness | None = None
 ) -> Evaluation:
     """Evaluate constraints, pattern, roots and objective of a design in the given cases, independently of any solver.
 
     Args:
-        robustness: the boundaries nearest to this design, if they are known.
+        robustness: the boundaries nearest to this design, if they are already known.
     """
     evaluated = _evaluate_cases(problem, parameters, problem.cases if cases is None else cases, robustness)
     violations, amounts = evaluated.violations(problem.conditions)
-    nominal, top, crossing = evaluated.nominal, evaluated.worst["abscissa"], False
-    structure = evaluated.each[top]["structure"]
+    nominal, worst_index, crossing = evaluated.nominal, evaluated.worst["abscissa"], False
+    structure = evaluated.each[worst_index]["structure"]
     if not math.isfinite(structure.abscissa):
-        exist = all(math.isfinite(float(c)) for c in evaluated.each[top].coefficients)
+        exist = all(math.isfinite(float(c)) for c in evaluated.each[worst_index].coefficients)
         violations["a0" if exist else "coefficients"] = 1.0  # a singular mass matrix, or undefined
     if problem.pattern is not None:
         a = [float(c) for c in nominal.coefficients]
@@ -84,23 +81,27 @@ def recheck(
         crossing = distance <= MATCHED and is_crossing(problem, problem.pattern, parameters)
         if crossing or not distance <= MATCHED:
             violations[problem.pattern.name] = 1.0 if crossing else distance
-    of = problem.parameter_set
-    names = [n for n in (*public_names(problem.model, of), "damping_ratio") if n not in problem.model.sets[0].names]
+    parameter_set = problem.parameter_set
+    names = [
+        n
+        for n in (*public_names(problem.model, parameter_set), "damping_ratio")
+        if n not in problem.model.sets[0].names
+    ]
     names += [RADIUS] if evaluated.robustness is not None else []
     names += [ANGULAR_FREQUENCY] if problem.asks(ANGULAR_FREQUENCY) else []
-    if of.rate is not None and structure.roots:  # times and frequencies belong to the worst case
+    if parameter_set.rate is not None and structure.roots:  # times and frequencies belong to the worst case
         nominal = nominal.with_known({"abscissa": structure.abscissa, "structure": structure})
     return Evaluation(
         structure=structure,
-        realised=realised_abscissa(problem, evaluated.cases[top].applied(parameters)),
+        realised=realised_abscissa(problem, evaluated.cases[worst_index].applied(parameters)),
         objective=evaluated.objective,
         violations=Table(violations),
         amounts=Table(violations | amounts),
         quantities=Table({name: float(nominal[name]) for name in names}),
-        dimensionless=Table({n: float(v) for n, v in of.native(parameters).items()}),
-        worst=evaluated.cases[top],
+        dimensionless=Table({n: float(v) for n, v in parameter_set.native(parameters).items()}),
+        worst=evaluated.cases[worst_index],
         least_damped=evaluated.cases[evaluated.worst["damping_ratio"]],
-        fastest=evaluated.cases[evaluated.worst.get(ANGULAR_FREQUENCY, top)],
+        fastest=evaluated.cases[evaluated.worst.get(ANGULAR_FREQUENCY, worst_index)],
         robustness=evaluated.robustness,
         crossing=crossing,
     )
@@ -109,24 +110,26 @@ def recheck(
 def find_missed_limits(
     problem: Posed, parameters: Numbers, cases: Sequence[Case], robustness: Robustness | None = None
 ) -> dict[str, float]:
-    """Limits that the exact roots of the parameters as stored miss → the amount, in units of the limit.
+    """Limits that the exact roots of the stored parameters miss → the amount, in units of the limit.
 
     Args:
         robustness: as for `recheck`.
     """
-    asked = {n: problem.conditions[n] for n in problem.asked_of_roots if RADIUS not in problem.conditions[n].names}
-    if not asked:
+    conditions = {n: problem.conditions[n] for n in problem.asked_of_roots if RADIUS not in problem.conditions[n].names}
+    if not conditions:
         return {}
     evaluated = _evaluate_cases(problem, parameters, cases, robustness)
-    near = {n: c for n, c in asked.items() if any(_may_be_missed(c, v) for v in evaluated.relevant_cases(c))}
-    exactly = _evaluate_cases(problem, parameters, cases, evaluated.robustness, parameters) if near else evaluated
-    return exactly.violations(near)[1]
+    doubtful = {n: c for n, c in conditions.items() if any(_may_be_missed(c, v) for v in evaluated.relevant_cases(c))}
+    exact_values = (
+        _evaluate_cases(problem, parameters, cases, evaluated.robustness, parameters) if doubtful else evaluated
+    )
+    return exact_values.violations(doubtful)[1]
 
 
 def recheck_exactly(
     problem: Posed, parameters: Mapping[str, Any], cases: Sequence[Case]
 ) -> tuple[Values, dict[str, float]]:
-    """Quantities of a design of exact numbers, and its violations above tolerance in the units of the sides.
+    """Quantities of a design of exact numbers, and its violations above the tolerance in the units of the sides.
 
     Root quantities come from exact roots and are the worst over the cases. The robustness radius is ignored.
     """
@@ -139,22 +142,25 @@ def _may_be_missed(condition: Expression, values: Values) -> bool:
     """Whether errors of numeric roots may hide that a condition is missed."""
     left, right = condition.sides(values)
     slack = -condition.sign * float(condition(values))
-    return condition.equality or not slack > _SCATTER * max(1.0, abs(left), abs(right))
+    return condition.equality or not slack > _ROOT_SCATTER * max(1.0, abs(left), abs(right))
 
 
 def _is_out_of_reach(problem: Posed, condition: Expression, values: Values) -> bool:
-    """Whether no design within a relative distance `FEASIBLE` meets a condition, so that its excess is no rounding.
+    """Whether no design within a relative distance `FEASIBLE` satisfies a condition.
 
-    (Fr - 1.7)**4 <= 0 is missed by only 1e-16 at Fr = 1.6999, but Fr is 1e-4 away. Parameters vary relative to their
-    size or range, root quantities relative to their size or 1. Interval arithmetic bounds the condition and its slopes.
+    Then its excess, however small, is no rounding error. For example, Fr = 1.6999 violates (Fr - 1.7)**4 <= 0 by only
+    1e-16, but Fr is 1e-4 away. Parameters vary relative to their size or range, root quantities relative to their size
+    or 1. Interval arithmetic bounds the condition and its slopes.
     """
-    of = problem.parameter_set
-    names = (*of.names, *(n for n in ROOT_NAMES if n in condition.names))
+    parameter_set = problem.parameter_set
+    names = (*parameter_set.names, *(n for n in ROOT_NAMES if n in condition.names))
     at = np.array([float(values[n]) for n in names])
     ends = np.array([problem.free.get(n, (0.0, 0.0)) for n in names])
-    reach = FEASIBLE * np.maximum(np.abs(at), np.where(np.arange(len(at)) < len(of.names), np.ptp(ends, axis=1), 1.0))
+    reach = FEASIBLE * np.maximum(
+        np.abs(at), np.where(np.arange(len(at)) < len(parameter_set.names), np.ptp(ends, axis=1), 1.0)
+    )
     try:
-        function = _condition_with_slopes(problem.model, of.name, condition, names)
+        function = _trace_condition(problem.model, parameter_set.name, condition, names)
         centre, around = (ranges(function, list(zip(at - r, at + r, strict=True))) for r in (0 * reach, reach))
     except UnsupportedOperation:
         return False
@@ -165,26 +171,28 @@ def _is_out_of_reach(problem: Posed, condition: Expression, values: Values) -> b
 
 
 @lru_cache(maxsize=256)
-def _condition_with_slopes(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> Formula:
+def _trace_condition(model: Model, set_name: str, condition: Expression, names: tuple[str, ...]) -> Formula:
     """A condition and its gradient as a function of parameters and root quantities."""
-    symbols, of = {name: symbol(name) for name in names}, model.parameter_set(set_name)
-    difference = condition(Values(model, of, {n: symbols[n] for n in of.names}).with_known(symbols))
+    symbols, parameter_set = {name: symbol(name) for name in names}, model.parameter_set(set_name)
+    difference = condition(
+        Values(model, parameter_set, {n: symbols[n] for n in parameter_set.names}).with_known(symbols)
+    )
     return formula([difference, *gradients([difference], list(symbols.values()))[0]], names)
 
 
 def measure_excesses(problem: Posed, parameters: Numbers, cases: Sequence[Case]) -> dict[str, float]:
-    """How far each limit must move until a design meets it: 0 or more, signed for an equality."""
-    evaluated, found = _evaluate_cases(problem, parameters, cases), {}
+    """How far each limit must move until a design satisfies it: 0 or more, with a sign for an equality."""
+    evaluated, excesses = _evaluate_cases(problem, parameters, cases), {}
     for name, condition in problem.conditions.items():
         differences = [float(condition(v)) for v in evaluated.relevant_cases(condition)]
-        beyond = max(0.0, *(_nan_as_infinite(condition.sign * d) for d in differences))
-        found[name] = differences[0] if condition.equality else beyond
-    return found
+        excess = max(0.0, *(_replace_nan(condition.sign * d) for d in differences))
+        excesses[name] = differences[0] if condition.equality else excess
+    return excesses
 
 
 @dataclass(frozen=True)
 class _CaseValues:
-    """The values of a design in its cases; root quantities are the worst over them.
+    """The values of a design in its cases; root quantities have their worst values over the cases.
 
     Attributes:
         worst: root quantity → index of its worst case; the angular frequency only if the problem uses it.
@@ -203,22 +211,20 @@ class _CaseValues:
 
     @property
     def objective(self) -> float:
-        """The objective, the worst over the cases if it depends on them; nan without one."""
+        """The objective, in its worst case if it depends on the case; nan without an objective."""
         objective, sign = self.problem.objective, self.problem.sign
         if objective is None:
             return math.nan
         return sign * max(
-            (sign * float(objective(values)) for values in self.relevant_cases(objective)), key=_nan_as_infinite
+            (sign * float(objective(values)) for values in self.relevant_cases(objective)), key=_replace_nan
         )
 
     def violations(self, conditions: Mapping[str, Expression]) -> tuple[dict[str, float], dict[str, float]]:
-        """Violations above tolerance, relative and in the units of the sides."""
+        """Violations above the tolerance, relative and in the units of the sides."""
         violations, amounts = {}, {}
         for name, condition in conditions.items():
             at = self.relevant_cases(condition)
-            violation, worst = max(
-                ((condition.violation(v), v) for v in at), key=lambda pair: _nan_as_infinite(pair[0])
-            )
+            violation, worst = max(((condition.violation(v), v) for v in at), key=lambda pair: _replace_nan(pair[0]))
             if not violation <= FEASIBLE or (violation > 0 and _is_out_of_reach(self.problem, condition, worst)):
                 violations[name] = violation
                 amounts[name] = float(condition.excess(float(condition(worst))))
@@ -233,19 +239,19 @@ def _evaluate_cases(
     stored: Mapping[str, Any] | None = None,
 ) -> _CaseValues:
     """Evaluate a design in its cases, with roots of its structure or exact roots of the `stored` parameters."""
-    listed = [case for case in cases if not case.direction] or [Case()]
+    stated_cases = [case for case in cases if not case.direction] or [Case()]
 
     @cache
     def values(case: Case) -> Values:
-        found = problem.values(case.applied(parameters))
+        case_values = problem.values(case.applied(parameters))
         if stored is None:
-            return found
-        exactly = roots_at(problem.model, problem.parameter_set, case.applied(stored))
-        return found.with_known({"structure": Structure("undecided", exactly, 0.0)})
+            return case_values
+        exact_roots = roots_at(problem.model, problem.parameter_set, case.applied(stored))
+        return case_values.with_known({"structure": Structure("undecided", exact_roots, 0.0)})
 
-    nominal, *each = map(values, (Case(), *listed))
+    nominal, *each = map(values, (Case(), *stated_cases))
     worst = {
-        name: max(range(len(each)), key=lambda k: _nan_as_infinite(sign * each[k][name]))
+        name: max(range(len(each)), key=lambda k: _replace_nan(sign * each[k][name]))
         for name, sign in WORSE_DIRECTION.items()
         if name != ANGULAR_FREQUENCY or problem.asks(ANGULAR_FREQUENCY)
     }
@@ -255,14 +261,14 @@ def _evaluate_cases(
     if robustness is not None:
         shared[RADIUS] = robustness.radius
     nominal, *each = (v.with_known({"structure": v["structure"], **shared}) for v in (nominal, *each))
-    return _CaseValues(problem, listed, nominal, each, worst, robustness)
+    return _CaseValues(problem, stated_cases, nominal, each, worst, robustness)
 
 
-def _nan_as_infinite(value: float) -> float:
+def _replace_nan(value: float) -> float:
     return math.inf if math.isnan(value) else value
 
 
 def realised_abscissa(problem: Posed, parameters: Numbers) -> float:
-    """Abscissa of the parameters exactly as stored."""
-    found = roots_at(problem.model, problem.parameter_set, parameters)
-    return found[0].re if found else math.nan
+    """The abscissa of the parameters exactly as they are stored."""
+    roots = roots_at(problem.model, problem.parameter_set, parameters)
+    return roots[0].re if roots else math.nan

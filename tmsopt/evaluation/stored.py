@@ -1,14 +1,15 @@
-"""Finds a design in doubles that meets limits on the roots exactly as stored, near an ideal design that misses them.
+"""Finds a design in doubles whose exact roots satisfy the limits, near an ideal design.
 
-A change ε of a coefficient moves an m-fold root s₀ by ε^(1/m), so the doubles nearest to an ideal design miss a limit
-by 1e-8 at a double root and by 4e-4 at a 4-fold one. The remedy is to spread the roots along the limit. Let u be its
-direction, s = s₀ + u t, and ∏ (t − tⱼ) = tᵐ + c₁ tᵐ⁻¹ + … + c_m. Roots spread evenly over −h ≤ t ≤ h stay within d of
-their line if cₖ is within h^(k−1) d / 2 of its target across the limit and within hᵏ / 8 along it (k ≥ 2). The line may
-lie inside the limit by about h²; that and the spread each cost h².
+A change ε of a coefficient moves an m-fold root s₀ by ε^(1/m). So the doubles nearest to an ideal design miss a limit
+by 1e-8 at a double root and by 4e-4 at a 4-fold root. The remedy is to spread the roots along the limit. Let u be the
+direction of the limit, s = s₀ + u t, and ∏ (t − tⱼ) = tᵐ + c₁ tᵐ⁻¹ + … + c_m. Roots that are spread evenly over
+−h ≤ t ≤ h stay within d of their line if cₖ is within h^(k−1) d / 2 of its target across the limit, and within hᵏ / 8
+of its target along the limit (k ≥ 2). The line may lie inside the limit by about h². This distance and the spread each
+worsen the objective by about h².
 
-Doubles near such a design form a lattice. A reduced basis (Lenstra, Lenstra and Lovász 1982) and the nearest plane
-(Babai 1986) give its closest point in these units, which is then checked by exact roots. h grows until a point meets
-every limit.
+Doubles near such a design form a lattice. A reduced basis (Lenstra, Lenstra and Lovász 1982) and the nearest-plane
+method (Babai 1986) give the closest point of the lattice, which is then checked by exact roots. h grows until a point
+satisfies every limit.
 """
 
 import itertools
@@ -34,19 +35,19 @@ from tmsopt.roots import Root, Structure, product
 from tmsopt.roots.exact import isolated_roots
 from tmsopt.roots.patterns.root_enclosures import nearest_roots
 
-_DIGITS = 150  # slopes are differences over 2⁻¹⁰⁰ of a parameter
+_DIGITS = 150  # digits of the arithmetic, since slopes are differences over 2⁻¹⁰⁰ of a parameter
 _SPREADS = 4.0 ** np.arange(10) * 2e-12  # h² over s₀² C(m, 2), from the tolerance of a structure up to 5e-7
-_LINE = 1e-6  # relative distance from the worst root within which another one is on the limit too
+_SAME_LINE = 1e-6  # relative distance from the worst root within which another root is also on the limit
 _STEPS, _TRIALS, _NEIGHBOURS = 4, 4, 4  # Newton steps; lattice points checked; basis vectors varied near the closest
 _RANK = 1e-9  # relative singular value below which a direction moves nothing
-_MOVE = 3e-12  # relative size of moves on the lattice, small enough for constant slopes
-_LEAST = 1e-3  # natural size of a parameter near 0, as a share of its range
-_FINEST = 1e-20  # relative step of a parameter that is 0
+_LATTICE_MOVE = 3e-12  # relative size of moves on the lattice, small enough for constant slopes
+_MIN_SIZE = 1e-3  # natural size of a parameter near 0, as a share of its range
+_MIN_STEP = 1e-20  # relative step of a parameter that is 0
 _BITS = 60  # fractional bits of the lattice coordinates
-_NOTHING = 1e-14  # of the size of roots: less is rounding
-_APART, _SHOWN = 1e-6, 7  # relative difference from which both abscissae are shown; digits that show it
+_ZERO_SIZE = 1e-14  # share of the size of the roots below which an abscissa counts as 0
+_SHOWN_DIFFERENCE, _SHOWN_DIGITS = 1e-6, 7  # relative difference from which both abscissae are shown, and digits
 _ROUNDINGS = (1, -1, 4, -4, 16, -16, 64, -64, 256, -256)  # units in the last place to try
-_AT_END = 1e-9  # of a range: a parameter this close to an end stays there
+_END_DISTANCE = 1e-9  # share of a range; a parameter that is closer to an end stays at the end
 
 
 @dataclass(frozen=True)
@@ -54,15 +55,15 @@ class _Cluster:
     """A multiple root on a limit.
 
     Attributes:
-        case: the case that has it.
+        case: the case that has the root.
         root: the root of the ideal design, on or above the real axis.
-        along: unit vector along the limit; the feasible side is on its left.
-        exactly: whether the limit is an equality.
+        direction: unit vector along the limit; the feasible side is on its left.
+        equality: whether the limit is an equality.
     """
 
     case: Case
     root: Root
-    along: complex
+    direction: complex
     equality: bool
 
     @property
@@ -70,108 +71,112 @@ class _Cluster:
         return complex(self.root.re, self.root.im)
 
     def components(self) -> Iterator[tuple[int, bool]]:
-        """(k, whether the real part) for each part of each cₖ that is neither 0 by symmetry nor free to move."""
+        """For the parts of each cₖ that are neither 0 by symmetry nor free to change: k, and whether it is real."""
         for k in range(1, self.root.multiplicity + 1):
             for real in (True, False):
-                if (k > 1 or not real) and (self.root.im or real == (k % 2 == 0 or self.along.imag == 0)):
+                if (k > 1 or not real) and (self.root.im or real == (k % 2 == 0 or self.direction.imag == 0)):
                     yield k, real
 
 
 def find_storable_design(
     problem: Posed, parameters: Numbers, checked: Evaluation, cases: Sequence[Case]
 ) -> tuple[Numbers, Evaluation, Numbers]:
-    """Move a feasible design as little as needed to meet limits on its roots exactly as stored.
+    """Move a feasible design as little as needed until its roots, exactly as stored, satisfy the limits.
 
-    It also moves if its objective is undefined as stored, as next to the end of a square root.
+    The design also moves if its objective is undefined as stored, for example next to the end of a square root.
 
     Returns:
-        The design; its recheck, with the structure of the ideal design; and nothing missed. If none is found: the given
-        design, its recheck, and limit → amount that it misses.
+        The design; its recheck, with the structure of the ideal design; and an empty table. If no such design is found:
+        the given design, its recheck, and limit → amount by which it misses the limit.
     """
     amounts = {} if checked.violations else find_missed_limits(problem, parameters, cases, checked.robustness)
     if checked.violations or (not amounts and _has_objective(problem, parameters)):
         return parameters, checked, {}
     if amounts:
-        clusters = _clusters(problem, parameters, checked, cases, list(amounts))
+        clusters = _find_clusters(problem, parameters, checked, cases, list(amounts))
         ends = problem.free.items()
-        inside = [n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _AT_END * (hi - lo)]
-        groups = [names for names in dict.fromkeys((tuple(inside), tuple(problem.free))) if names and clusters]
-        ways = (
+        inner_names = [
+            n for n, (lo, hi) in ends if min(parameters[n] - lo, hi - parameters[n]) > _END_DISTANCE * (hi - lo)
+        ]
+        groups = [names for names in dict.fromkeys((tuple(inner_names), tuple(problem.free))) if names and clusters]
+        attempts = (
             _SpreadRoots(problem, parameters, clusters, *way) for way in itertools.product(groups, _SPREADS.tolist())
         )
-        others: Iterator[dict[str, float]] = (design for way in ways for design in way.designs())
+        designs: Iterator[dict[str, float]] = (design for way in attempts for design in way.designs())
     else:  # move one free parameter by a few units in the last place
-        near = (
+        near_designs = (
             {**parameters, name: x}
             for steps, (name, (lower, upper)) in itertools.product(_ROUNDINGS, problem.free.items())
             if lower <= (x := parameters[name] + steps * math.ulp(parameters[name])) <= upper
         )
-        others = (design for design in near if _has_objective(problem, design))
-    for design in others:
+        designs = (design for design in near_designs if _has_objective(problem, design))
+    for design in designs:
         if not find_missed_limits(problem, design, cases, checked.robustness):
-            again = recheck(problem, design, cases, checked.robustness)
-            if set(again.violations) <= set(problem.asked_of_roots):
-                return design, _keep_structure(problem, design, checked, again), {}
+            new_check = recheck(problem, design, cases, checked.robustness)
+            if set(new_check.violations) <= set(problem.asked_of_roots):
+                return design, _keep_structure(problem, design, checked, new_check), {}
     return parameters, checked, amounts
 
 
 def _has_objective(problem: Posed, parameters: Numbers) -> bool:
-    """Whether the objective is defined at the parameters exactly as stored; root quantities always are."""
-    asked = problem.objective
-    if asked is None or set(asked.names) & set(ROOT_NAMES):
+    """Whether the objective is defined at the parameters exactly as stored; root quantities are always defined."""
+    objective = problem.objective
+    if objective is None or set(objective.names) & set(ROOT_NAMES):
         return True
     with flint.ctx.workdps(_DIGITS):
         exact = {n: flint.arb(x) for n, x in parameters.items()}
-        return bool(as_ball(asked(Values(problem.model, problem.parameter_set, exact))).is_finite())
+        return bool(as_ball(objective(Values(problem.model, problem.parameter_set, exact))).is_finite())
 
 
 def abscissa_as_stored(solution: Solution) -> str:
-    """The abscissa as stored in words, after the ideal one unless that is the objective.
+    """The abscissa as stored, in words. The ideal abscissa comes first, unless it is the objective.
 
     Empty if the two differ by at most a millionth.
     """
     ideal, realised = solution.abscissa, solution.abscissa_realised
     size = max((r.size for r in solution.of_polynomial.roots), default=0.0)
-    ideal, realised = (x if abs(x) > _NOTHING * size else 0.0 for x in (ideal, realised))
-    if not abs(realised - ideal) > _APART * abs(ideal) + FEASIBLE * size:
+    ideal, realised = (x if abs(x) > _ZERO_SIZE * size else 0.0 for x in (ideal, realised))
+    if not abs(realised - ideal) > _SHOWN_DIFFERENCE * abs(ideal) + FEASIBLE * size:
         return ""
     at = solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
     problem = solution.problem.posed
     unit = unit_at(problem, "abscissa", at)
-    first = "" if problem.goal == "abscissa" else f"abscissa {unit.show(ideal, _SHOWN)}, "
-    return f"{first}{unit.number(realised, _SHOWN)} in double precision"
+    first = "" if problem.goal == "abscissa" else f"abscissa {unit.show(ideal, _SHOWN_DIGITS)}, "
+    return f"{first}{unit.number(realised, _SHOWN_DIGITS)} in double precision"
 
 
 def missed_note(problem: Posed, amounts: Numbers) -> tuple[str, ...]:
-    """A sentence on the limits that the parameters miss as stored; none if they miss none."""
-    why = "no doubles nearby that satisfy every limit were found" if problem.free else "the ideal design satisfies them"
-    return (f"rounded to doubles, the parameters violate {amounts_text(problem, amounts)}; {why}",) if amounts else ()
+    """A sentence on the limits that the stored parameters miss; empty if they miss no limit."""
+    reason = (
+        "no doubles nearby that satisfy every limit were found" if problem.free else "the ideal design satisfies them"
+    )
+    return (
+        (f"rounded to doubles, the parameters violate {amounts_text(problem, amounts)}; {reason}",) if amounts else ()
+    )
 
 
-def _clusters(
-    problem: Posed,
-    parameters: Numbers,
-    checked: Evaluation,
-    cases: Sequence[Case],
-    names: Sequence[str],
+def _find_clusters(
+    problem: Posed, parameters: Numbers, checked: Evaluation, cases: Sequence[Case], names: Sequence[str]
 ) -> list[_Cluster]:
     """The multiple roots that lie on the named limits."""
-    asked = {name for limit in names for name in problem.conditions[limit].names}
-    exactly = any(problem.conditions[limit].equality for limit in names)
-    found = []
+    limited_names = {name for limit in names for name in problem.conditions[limit].names}
+    is_equality = any(problem.conditions[limit].equality for limit in names)
+    clusters = []
     for case in [case for case in cases if not case.direction] or [Case()]:
         structure = problem.values(case.applied(parameters))["structure"]
-        size = _LINE * max(r.size for r in structure.roots)
+        size = _SAME_LINE * max(r.size for r in structure.roots)
         for root in structure.roots:
             z = complex(root.re, root.im)
             if root.multiplicity == 1 or root.im < 0 or z == 0:
                 continue
-            fast = ANGULAR_FREQUENCY in asked and root.im >= checked.quantities[ANGULAR_FREQUENCY] - size
-            undamped = "damping_ratio" in asked and -root.re <= (checked.quantities["damping_ratio"] + _LINE) * abs(z)
-            if fast or undamped or root.re >= checked.structure.abscissa - size:
-                along = -1.0 if fast else z / abs(z) if undamped else 1j
-                found.append(_Cluster(case, root, along, exactly))
-    return found
+            is_fast = ANGULAR_FREQUENCY in limited_names and root.im >= checked.quantities[ANGULAR_FREQUENCY] - size
+            is_undamped = "damping_ratio" in limited_names and -root.re <= (
+                checked.quantities["damping_ratio"] + _SAME_LINE
+            ) * abs(z)
+            if is_fast or is_undamped or root.re >= checked.structure.abscissa - size:
+                direction = -1.0 if is_fast else z / abs(z) if is_undamped else 1j
+                clusters.append(_Cluster(case, root, direction, is_equality))
+    return clusters
 
 
 @dataclass(frozen=True)
@@ -196,11 +201,11 @@ class _SpreadRoots:
         for cluster in self.clusters:
             m, size = cluster.root.multiplicity, abs(cluster.place)
             h = size * math.sqrt(self.spread * math.comb(m, 2))
-            inside = 0.0 if cluster.equality else size * self.spread
-            c = np.poly(h * np.linspace(-1, 1, m) + 1j * inside)
-            across = (FEASIBLE * size + inside) / 2
+            inner_distance = 0.0 if cluster.equality else size * self.spread
+            c = np.poly(h * np.linspace(-1, 1, m) + 1j * inner_distance)
+            width = (FEASIBLE * size + inner_distance) / 2
             for k, real in cluster.components():
-                leeway = h**k / 8 if real else h ** (k - 1) * across
+                leeway = h**k / 8 if real else h ** (k - 1) * width
                 aims.append((c[k].real if real else c[k].imag, leeway, size**k))
         return np.array(aims).T
 
@@ -208,21 +213,21 @@ class _SpreadRoots:
     def widths(self) -> Array:
         """Natural sizes of the parameters that may be moved."""
         free = self.problem.free
-        return np.array([max(abs(self.parameters[n]), _LEAST * np.ptp(free[n])) for n in self.names])
+        return np.array([max(abs(self.parameters[n]), _MIN_SIZE * np.ptp(free[n])) for n in self.names])
 
     def designs(self) -> Iterator[dict[str, float]]:
         """Doubles in the box that are close to the design with spread clusters, the most promising first."""
-        leeway, moves = self.aims[1], _MOVE * self.widths
+        leeway, moves = self.aims[1], _LATTICE_MOVE * self.widths
         with flint.ctx.workdps(_DIGITS):
             at, _, slope = self.solve_ideal()
             start = {n: float(at[n]) for n in self.names}
-            off = [float(x) for x in self.deviations({**at, **{n: flint.arb(x) for n, x in start.items()}})]
-            aside = np.array([float(flint.arb(x) - at[n]) for n, x in start.items()])
-        if not np.all(np.isfinite([*off, *start.values(), *slope.ravel()])):
+            deviations = [float(x) for x in self.deviations({**at, **{n: flint.arb(x) for n, x in start.items()}})]
+            rounding = np.array([float(flint.arb(x) - at[n]) for n, x in start.items()])
+        if not np.all(np.isfinite([*deviations, *start.values(), *slope.ravel()])):
             return
-        units = np.maximum([math.ulp(x) for x in start.values()], _FINEST * self.widths)
+        units = np.maximum([math.ulp(x) for x in start.values()], _MIN_STEP * self.widths)
         rows = np.hstack([slope * units[:, None] / leeway, np.diag(units / moves)])
-        for counts in _nearest_combinations(rows, np.array([*(off / leeway), *(aside / moves)])):
+        for counts in _list_combinations(rows, np.array([*(deviations / leeway), *(rounding / moves)])):
             steps = zip(start.items(), counts, units.tolist(), strict=True)
             design = {**self.parameters, **{n: x + count * unit for (n, x), count, unit in steps}}
             if all(lo <= design[n] <= hi for n, (lo, hi) in self.problem.free.items()):
@@ -232,60 +237,60 @@ class _SpreadRoots:
         """The design after Newton steps with the first slopes, its deviations, and those slopes."""
         size, widths = self.aims[2], self.widths
         at = {n: flint.arb(x) for n, x in self.parameters.items()}
-        off, slopes = self.deviations(at), []
+        deviations, slopes = self.deviations(at), []
         for n, width in zip(self.names, widths.tolist(), strict=True):
             step = flint.arb(width) * flint.arb(2) ** -100
-            moved = self.deviations({**at, n: at[n] + step})
-            slopes.append([float((b - a) / step) for a, b in zip(off, moved, strict=True)])
+            changed = self.deviations({**at, n: at[n] + step})
+            slopes.append([float((b - a) / step) for a, b in zip(deviations, changed, strict=True)])
         slope = np.array(slopes)
         if np.all(np.isfinite(slope)):
             inverse = np.linalg.pinv((slope * widths[:, None] / size).T, rcond=_RANK)
             for _ in range(_STEPS):
-                steps = widths * (inverse @ (np.array([float(x) for x in off]) / size))
+                steps = widths * (inverse @ (np.array([float(x) for x in deviations]) / size))
                 at |= {n: (at[n] - flint.arb(step)).mid() for n, step in zip(self.names, steps.tolist(), strict=True)}
-                off = self.deviations(at)
-        return at, off, slope
+                deviations = self.deviations(at)
+        return at, deviations, slope
 
     def deviations(self, at: Mapping[str, Any]) -> list[Any]:
         """Each part of each cₖ of an exact design, minus its target."""
-        found, target = [], self.aims[0].tolist()
+        parts, target = [], self.aims[0].tolist()
         for cluster in self.clusters:
             a = self.problem.model.coefficients(cluster.case.applied(at), self.problem.parameter_set)
             if not all(c.is_finite() for c in a):
                 return [flint.arb("nan")] * len(target)
-            place, along = flint.acb(cluster.place), flint.acb(cluster.along)
+            place, direction = flint.acb(cluster.place), flint.acb(cluster.direction)
             z = sorted((z for z, m in isolated_roots(a) for _ in range(m)), key=lambda z: float(abs(z - place)))
-            c = product(*([flint.acb(1), (place - root) / along] for root in z[: cluster.root.multiplicity]))
-            found += [c[k].real if real else c[k].imag for k, real in cluster.components()]
-        return [(x - t).mid() for x, t in zip(found, target, strict=True)]
+            c = product(*([flint.acb(1), (place - root) / direction] for root in z[: cluster.root.multiplicity]))
+            parts += [c[k].real if real else c[k].imag for k, real in cluster.components()]
+        return [(x - t).mid() for x, t in zip(parts, target, strict=True)]
 
 
-def _nearest_combinations(rows: Array, off: Array) -> Iterator[list[int]]:
-    """Integer combinations of rows that cancel `off` best, the best first."""
-    whole = [[int(math.ldexp(x, _BITS)) for x in row] for row in rows.tolist()]
-    reduced, transform = flint.fmpz_mat(whole).lll(True)
+def _list_combinations(rows: Array, residual: Array) -> Iterator[list[int]]:
+    """Integer combinations of rows that cancel `residual` best; the best combination comes first."""
+    integers = [[int(math.ldexp(x, _BITS)) for x in row] for row in rows.tolist()]
+    reduced, transform = flint.fmpz_mat(integers).lll(True)
     n = len(rows)
-    basis = np.array([[math.ldexp(int(reduced[i, j]), -_BITS) for j in range(len(off))] for i in range(n)])
+    basis = np.array([[math.ldexp(int(reduced[i, j]), -_BITS) for j in range(len(residual))] for i in range(n)])
     q, r = np.linalg.qr(basis.T)
-    rest, nearest = off, [0] * n
+    remainder, combination = residual, [0] * n
     for i in range(n)[::-1]:
-        nearest[i] = -round(float(q[:, i] @ rest / r[i, i]))
-        rest = rest + nearest[i] * basis[i]
+        combination[i] = -round(float(q[:, i] @ remainder / r[i, i]))
+        remainder = remainder + combination[i] * basis[i]
     neighbours = itertools.product((0, 1, -1), repeat=min(n, _NEIGHBOURS))
-    ranked = sorted(neighbours, key=lambda more: float(np.abs(rest + more @ basis[: len(more)]).max()))
-    for more in ranked[:_TRIALS]:
-        by = [a + b for a, b in itertools.zip_longest(nearest, more, fillvalue=0)]
+    ranked = sorted(neighbours, key=lambda changes: float(np.abs(remainder + changes @ basis[: len(changes)]).max()))
+    for changes in ranked[:_TRIALS]:
+        by = [a + b for a, b in itertools.zip_longest(combination, changes, fillvalue=0)]
         yield [sum(b * int(transform[i, j]) for i, b in enumerate(by)) for j in range(n)]
 
 
-def _keep_structure(problem: Posed, design: Numbers, checked: Evaluation, again: Evaluation) -> Evaluation:
+def _keep_structure(problem: Posed, design: Numbers, checked: Evaluation, new_check: Evaluation) -> Evaluation:
     """The recheck of a moved design, with the structure of the ideal one."""
-    structure = again.structure
+    structure = new_check.structure
     if structure.name != checked.structure.name:
         with flint.ctx.workdps(_DIGITS):
             exact = {n: flint.arb(x) for n, x in checked.worst.applied(design).items()}
             a = problem.model.coefficients(exact, problem.parameter_set)
-            found = nearest_roots(a, checked.structure.roots) or ()
-        roots = tuple(Root(float(r.re), float(r.im), r.multiplicity) for r in found) or checked.structure.roots
+            exact_roots = nearest_roots(a, checked.structure.roots) or ()
+        roots = tuple(Root(float(r.re), float(r.im), r.multiplicity) for r in exact_roots) or checked.structure.roots
         structure = Structure(checked.structure.name, roots, checked.structure.distance)
-    return replace(again, structure=structure, violations=checked.violations, amounts=checked.amounts)
+    return replace(new_check, structure=structure, violations=checked.violations, amounts=checked.amounts)

@@ -1,8 +1,8 @@
 """Traces sets of exceptional points as curves with events; domains of stability; the swallowtail.
 
-A pattern must leave one degree of freedom. `trace` finds every curve of it in the box as a `Branch`; `continuation`
-follows one curve, `seeds` finds points on new curves, `events` locates what happens on them, and `steering` lets a user
-follow a curve point by point.
+A pattern of roots must leave one degree of freedom. `trace` finds its curves in the box of the free parameters, each as
+a `Branch`. `continuation` follows one curve, `seeds` finds points on new curves, and `events` locates special points on
+the curves. `steering` lets a user follow a curve point by point.
 """
 
 import lazy_loader

@@ -21,11 +21,12 @@ class EventPoint:
 
     Attributes:
         name: ``EP4``, ``EP3``, ``2EP2``, ``double zero``, ``weave``, ``capsize``, ``fold``, ``constraint`` or ``end``,
-            or the name of a user's `tmsopt.Event`; one that stops a branch is at its end, where the next one begins.
-        detail: in words, such as the parameter that folds or the limit that ends the branch.
+            or the name of a user's `tmsopt.Event`. An event that stops a branch is its last point, and the first point
+            of the next branch.
+        detail: the event in words, such as the parameter that folds or the limit that ends the branch.
         parameters: every parameter of the point.
         index: row of the branch.
-        residual: relative mismatch of the coefficients there.
+        residual: relative mismatch of the coefficients at the point.
 
     Example:
         >>> found = next(e for e in tmsopt.trace("problems/ep_set.toml").events if e.name == "EP4")
@@ -51,17 +52,17 @@ class Branch(Tabular):
         parameters: name → values along the curve, every parameter of the set, shape (n,).
         unknowns: factor coefficients of the pattern, by name, shape (n,).
         tangent: free parameter → its derivative by the arclength.
-        arclength: from the first point, with every free parameter measured in widths of its box.
-        kinds: name of the root pattern at each point; 2EP2, EP4 and CEP2 on one curve.
-        stable: where every root that the pattern does not place on the imaginary axis is left of it.
-        heavily_damped: where all roots are real and negative, or placed at 0 by the pattern.
-        satisfied: where every inequality constraint of the problem holds.
+        arclength: length of the curve from its first point, with each free parameter in widths of its range.
+        kinds: name of the root pattern at each point. For example, one curve has the patterns 2EP2, EP4 and CEP2.
+        stable: whether every root is left of the imaginary axis, except the roots that the pattern places on it.
+        heavily_damped: whether all roots are real and negative, except the roots that the pattern places at 0.
+        satisfied: whether every inequality constraint of the problem holds.
         abscissa: largest real part of the roots, from the factors.
         events: in the order of the arclength.
         closed: whether the last point is the first.
         residual: largest mismatch of a coefficient along the curve, relative to its terms.
-        eigenfrequency: for a complex system, the multiple one as ``omega_re`` and ``omega_im``, printed instead of
-            `unknowns`.
+        eigenfrequency: the multiple eigenfrequency of a complex system as ``omega_re`` and ``omega_im``, which are
+            printed instead of `unknowns`; None for a real system.
 
     Example:
         >>> branch = tmsopt.trace("problems/ep_set.toml").branches[0]
@@ -135,7 +136,7 @@ class Trace(Tabular):
 
     Attributes:
         starts: number of designs from which branches were searched.
-        seconds: total time; `seconds_walking` is the time of the points alone.
+        seconds: total time; `seconds_walking` is the time for following the curves only.
 
     Example:
         >>> traced = tmsopt.trace("problems/ep_set.toml")
@@ -204,9 +205,10 @@ class BranchPoint:
         parameters: every parameter of the point.
         unknowns: factor coefficients of the pattern, by name.
         tangent: free parameter → its derivative by the arclength, in the direction of travel.
-        arclength: from the first point, with every free parameter in widths of its box; negative behind it.
+        arclength: length of the curve from the first point, with each free parameter in widths of its range. It is
+            negative behind the first point.
         kind: name of the root pattern, such as ``2EP2`` or ``CEP2`` on one curve.
-        stable: whether every root that the pattern does not place on the imaginary axis is left of it.
+        stable: whether every root is left of the imaginary axis, except the roots that the pattern places on it.
         abscissa: largest real part of the roots.
         events: names of the events at this point; most points have none.
 
@@ -235,14 +237,14 @@ def table_at(columns: Mapping[str, Array], row: int) -> Table[float]:
 
 
 def name_unknowns(pattern: str, unknowns: Mapping[str, Array], parameters: Iterable[str]) -> dict[str, Array]:
-    """Unknowns by unique names: one that a parameter has too is prefixed with the pattern."""
+    """Unknowns by unique names: if a parameter has the same name, the unknown gets the pattern as a prefix."""
     return {f"{pattern}.{name}" if name in parameters else name: column for name, column in unknowns.items()}
 
 
 def kinds_along(branch: Branch) -> list[str]:
-    """The pattern at each point; a special point counts with the one before it."""
-    special = {e.index for e in branch.events if str(branch.kinds[e.index]) == e.name}
+    """The pattern at each point; a special point, such as an EP4, gets the pattern of the point before it."""
+    special_rows = {e.index for e in branch.events if str(branch.kinds[e.index]) == e.name}
     kinds = [str(k) for k in branch.kinds]
-    for row in sorted(special) if len(kinds) > 1 else ():
+    for row in sorted(special_rows) if len(kinds) > 1 else ():
         kinds[row] = kinds[row - 1] if row else kinds[1]
     return kinds

@@ -18,21 +18,23 @@ import numpy as np
 from tmsopt.records import Array
 from tmsopt.tracing.solving import MappedFunction, evaluate_rows, find_zeros, map_rows
 
-_CONVERGED = 1e-8  # last Newton step, relative to the point; the remaining error is its square
-_CONTRACTION = 0.1  # largest ratio of the second Newton step to the first; above it the prediction was too far
-_COSINE = np.cos(0.15)  # of the largest angle between successive tangents
-_SMALLEST = 1e-12
-_GROWTH = 1.5
-_ROOM = 4.0  # steps of variables without a box are longer by this factor; their spacing does not matter
-_REMOTE = 100.0  # units of the scale above which the steps grow, towards infinity
-_FAR = 1e6  # units of the scale above which the equations lose their digits
-_FADING = 1e5  # above it a failed step means infinity: which step fails depends on rounding
-_SAME = 1e-7
-_EDGE = 1e-12  # rounding of a variable of order 1 on a curve that lies in a limit
+_NEWTON_TOLERANCE = 1e-8  # largest last Newton step, relative to the point; the error that remains is its square
+_MAX_CONTRACTION = 0.1  # largest ratio of the second Newton step to the first; above it the step was too long
+_MIN_COSINE = np.cos(0.15)  # cosine of the largest angle between successive tangents
+_MIN_STEP = 1e-12  # if even this step fails, the curve ends
+_STEP_GROWTH = 1.5  # ratio of successive steps
+_UNBOUNDED_RATIO = (
+    4.0  # steps of variables without limits are this many times longer, since their spacing does not matter
+)
+_REMOTE_SIZE = 100.0  # size of a variable, in units of the scale, above which the steps grow
+_MAX_SIZE = 1e6  # size above which the equations lose their digits, so that the curve ends
+_INFINITE_SIZE = 1e5  # size above which a failed step means infinity; which step fails depends on rounding
+_SAME_POINT = 1e-7  # relative distance up to which two points count as one
+_LIMIT_ROUNDING = 1e-12  # rounding of a variable of order 1 on a curve that lies in a limit
 CLOSED = "closed"
 SINGULAR = "singular: the curve branches or has no direction here"
 INFINITE = "a root goes to infinity: a0 vanishes"
-_ISOLATED = 1e-6  # relative singular value below which the equations do not determine a direction
+_RANK = 1e-6  # relative singular value below which the equations do not determine a direction
 
 
 @dataclass(frozen=True)
@@ -41,9 +43,9 @@ class Curve:
 
     Attributes:
         scale: units of the variables.
-        lower, upper: limits of y, infinite where there are none.
+        lower, upper: limits of y; infinite without a limit.
         evaluate: y → F and its Jacobian in y.
-        advance: (y, t, s, origin) → next y, next t, and the measures by which `follow` accepts the step; None for more
+        advance: (y, t, s, origin) → next y, next t, and the numbers by which `follow` accepts the step. None for more
             than n equations.
     """
 
@@ -56,7 +58,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """A point y of a curve, in units of the scale, and the unit tangent t there, both of shape (n + 1,)."""
+    """A point y of a curve, in units of the scale, and the unit tangent t at the point, both of shape (n + 1,)."""
 
     y: Array
     t: Array
@@ -72,7 +74,12 @@ class End:
 
 @dataclass(frozen=True)
 class Walk:
-    """Points y and unit tangents t of a curve, shape (points, n + 1); why it ends on either side; the time taken."""
+    """Points y and unit tangents t along a curve, shape (points, n + 1).
+
+    Attributes:
+        ends: why the walk ends before its first point and after its last point.
+        seconds: the time that the walk took.
+    """
 
     y: Array
     t: Array
@@ -88,35 +95,35 @@ class Walk:
 def compile_curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> Curve:
     """Compile the curve equations(x) = 0 of a CasADi symbol x with n + 1 entries; limits are of x.
 
-    More than n equations leave isolated points at most; for these `Curve.evaluate` suffices.
+    The zeros of more than n equations are isolated points. To find them, `Curve.evaluate` is enough.
     """
     size, unit = x.numel(), ca.DM(scale)
     system = ca.Function("system", [x], [equations, ca.jacobian(equations, x)])
     y, t, s, origin = ca.SX.sym("y", size), ca.SX.sym("t", size), ca.SX.sym("s"), ca.SX.sym("origin", size)
     value, jacobian = system(y * unit)
-    scaled = ca.Function("scaled", [y], [ca.densify(value), ca.densify(ca.densify(jacobian) @ ca.diag(unit))])
+    scaled_system = ca.Function("scaled", [y], [ca.densify(value), ca.densify(ca.densify(jacobian) @ ca.diag(unit))])
     low, high = lower / scale, upper / scale
     if equations.numel() != size - 1:
-        return Curve(scale, low, high, scaled, None)
+        return Curve(scale, low, high, scaled_system, None)
     z, sizes = y + s * t, []
     for _ in range(3):
-        value, jacobian = scaled(z)
+        value, jacobian = scaled_system(z)
         correction = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(value, ca.dot(t, z - y) - s))
         z = z - correction
         sizes.append(ca.norm_2(correction) / (1 + ca.norm_inf(z)))
-    value, jacobian = scaled(z)
+    value, jacobian = scaled_system(z)
     tangent = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(ca.DM.zeros(size - 1), 1))
     tangent = tangent / ca.norm_2(tangent)
 
     boxed = np.isfinite(low) & np.isfinite(high)
-    unboxed = _ROOM * (1 + ca.fabs(z)) * ca.sqrt(ca.fmax(1, ca.fabs(z) / _REMOTE))
+    unboxed = _UNBOUNDED_RATIO * (1 + ca.fabs(z)) * ca.sqrt(ca.fmax(1, ca.fabs(z) / _REMOTE_SIZE))
     room = ca.vertcat(*(1 if boxed[k] else unboxed[k] for k in range(size)))
     reach = ca.mmin(room / (ca.fabs(tangent) + 1e-300))
     slack = ca.mmin(ca.vertcat(z - low, high - z))
     checks = ca.vertcat(
         *sizes, ca.dot(t, tangent), reach, slack, ca.norm_inf(z), ca.norm_2(origin - y), ca.dot(t, origin - y)
     )
-    return Curve(scale, low, high, scaled, ca.Function("advance", [y, t, s, origin], [z, tangent, checks]))
+    return Curve(scale, low, high, scaled_system, ca.Function("advance", [y, t, s, origin], [z, tangent, checks]))
 
 
 def compute_tangent(curve: Curve, y: Array) -> Array:
@@ -130,70 +137,87 @@ def compute_tangent(curve: Curve, y: Array) -> Array:
         norm = np.linalg.norm(balanced, axis=axis, keepdims=True)
         balanced = balanced / np.where(norm > 0, norm, 1.0)
     singular = np.linalg.svd(balanced, compute_uv=False)
-    if singular[-1] <= _ISOLATED * singular[0]:
+    if singular[-1] <= _RANK * singular[0]:
         raise ValueError("the equations do not determine a direction here")
     return np.asarray(np.linalg.svd(jacobian)[2][-1])
 
 
 def follow(curve: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
-    """Yield the points after a start along its tangent until a limit, a closed loop or infinity; then an `End`."""
+    """Yield the points after a start, in the direction of its tangent, and finally an `End`.
+
+    The curve ends at a limit, at its first point (it is closed), at a singular point, or near infinity.
+    """
 
     def advance(y: Array, t: Array, s: float) -> tuple[Any, ...]:
-        new, tangent, checks = step_from(y[None], t[None], np.array([[s]]), start.y[None])
-        return new[0], tangent[0], *checks[0].tolist()
+        next_y, tangent, checks = step_from(y[None], t[None], np.array([[s]]), start.y[None])
+        return next_y[0], tangent[0], *checks[0].tolist()
 
     y, t, count, step_from = start.y, start.t, 1, MappedFunction(curve.advance, 1)
     s, reach = step / 4, advance(y, t, 0.0)[6]
     while True:
         s = min(s, step * reach)
         while True:
-            new, tangent, first, second, third, cosine, reach, slack, largest, far, ahead = advance(y, t, s)
-            if third <= _CONVERGED and cosine >= _COSINE and (second <= _CONTRACTION * first or first < 1e-6):
+            next_y, tangent, first, second, third, cosine, reach, slack, largest, origin_distance, origin_step = (
+                advance(y, t, s)
+            )
+            if (
+                third <= _NEWTON_TOLERANCE
+                and cosine >= _MIN_COSINE
+                and (second <= _MAX_CONTRACTION * first or first < 1e-6)
+            ):
                 break  # never for nan
             s /= 2
-            if s < _SMALLEST:
-                yield End(INFINITE if np.abs(y).max() > _FADING else SINGULAR)
+            if s < _MIN_STEP:
+                yield End(INFINITE if np.abs(y).max() > _INFINITE_SIZE else SINGULAR)
                 return
-        if count > 2 and 0 < ahead <= s and far <= 2 * s and _is_same_point(advance(y, t, ahead)[0], start.y):
+        if (
+            count > 2
+            and 0 < origin_step <= s
+            and origin_distance <= 2 * s
+            and _is_same_point(advance(y, t, origin_step)[0], start.y)
+        ):
             yield from (start, End(CLOSED))
             return
-        if slack < 0 and not _runs_along_limit(curve, new, tangent):
-            yield from _stop_at_limit(curve, y, t, s, new)
+        if slack < 0 and not _runs_along_limit(curve, next_y, tangent):
+            yield from _stop_at_limit(curve, y, t, s, next_y)
             return
-        yield CurvePoint(new, tangent)
-        if largest > _FAR:
+        yield CurvePoint(next_y, tangent)
+        if largest > _MAX_SIZE:
             yield End(INFINITE)
             return
-        y, t, s, count = new, tangent, s * _GROWTH, count + 1
+        y, t, s, count = next_y, tangent, s * _STEP_GROWTH, count + 1
 
 
-def walk(curve: Curve, y: Array, t: Array, step: float, most: int) -> Walk:
-    """Follow the curve from y in the direction t until it ends or has `most` points."""
+def walk(curve: Curve, y: Array, t: Array, step: float, max_points: int) -> Walk:
+    """Follow the curve from y in the direction t until it ends or has `max_points` points."""
     start = CurvePoint(y, t)
-    points: list[Any] = [start, *islice(follow(curve, start, step), most - 1)]
-    end = points.pop() if isinstance(points[-1], End) else End(f"stopped after {most} points")
+    points: list[Any] = [start, *islice(follow(curve, start, step), max_points - 1)]
+    end = points.pop() if isinstance(points[-1], End) else End(f"stopped after {max_points} points")
     return Walk(np.array([p.y for p in points]), np.array([p.t for p in points]), (End("start"), end))
 
 
-def walk_both_ways(curve: Curve, y: Array, step: float, most: int) -> Walk | None:
+def walk_both_ways(curve: Curve, y: Array, step: float, max_points: int) -> Walk | None:
     """The whole curve through a point; None if it is not a regular point of a curve."""
     started = time.perf_counter()
     try:
         t = compute_tangent(curve, y)
     except ValueError:
         return None
-    whole = walk(curve, y, t, step, most)
-    if not whole.closed:
-        back = walk(curve, y, -t, step, most)
-        points, tangents = (np.concatenate(x) for x in ([back.y[:0:-1], whole.y], [-back.t[:0:-1], whole.t]))
-        whole = Walk(points, tangents, (back.ends[1], whole.ends[1]))
-    return replace(whole, seconds=time.perf_counter() - started) if len(whole.y) > 2 else None
+    forward_walk = walk(curve, y, t, step, max_points)
+    if not forward_walk.closed:
+        backward_walk = walk(curve, y, -t, step, max_points)
+        points, tangents = (
+            np.concatenate(x)
+            for x in ([backward_walk.y[:0:-1], forward_walk.y], [-backward_walk.t[:0:-1], forward_walk.t])
+        )
+        forward_walk = Walk(points, tangents, (backward_walk.ends[1], forward_walk.ends[1]))
+    return replace(forward_walk, seconds=time.perf_counter() - started) if len(forward_walk.y) > 2 else None
 
 
 def step_along(curve: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
     """Points and tangents at arclengths s from points of the curve, row by row; |s| is at most a step."""
-    new, tangent, _ = map_rows(curve.advance, y, t, s[:, None], y)
-    return new, tangent
+    new_points, tangent, _ = map_rows(curve.advance, y, t, s[:, None], y)
+    return new_points, tangent
 
 
 def is_on_walk(curve: Curve, walked: Walk, y: Array) -> bool:
@@ -202,32 +226,32 @@ def is_on_walk(curve: Curve, walked: Walk, y: Array) -> bool:
     k = int(np.argmin(distances))
     if distances[k] > 2 * np.linalg.norm(np.diff(walked.y[max(k - 1, 0) : k + 2], axis=0), axis=1).max(initial=0.0):
         return False
-    new, _ = step_along(curve, walked.y[[k]], walked.t[[k]], np.array([walked.t[k] @ (y - walked.y[k])]))
-    return _is_same_point(new[0], y)
+    new_points, _ = step_along(curve, walked.y[[k]], walked.t[[k]], np.array([walked.t[k] @ (y - walked.y[k])]))
+    return _is_same_point(new_points[0], y)
 
 
-def _is_same_point(y: Array, other: Array) -> bool:
-    """Whether two points are equal up to rounding."""
-    return bool(np.abs(y - other).max() <= _SAME * (1 + np.abs(other).max()))
+def _is_same_point(y: Array, reference: Array) -> bool:
+    """Whether two points are equal up to rounding errors."""
+    return bool(np.abs(y - reference).max() <= _SAME_POINT * (1 + np.abs(reference).max()))
 
 
 def _runs_along_limit(curve: Curve, y: Array, t: Array) -> bool:
     """Whether a curve outside the limits runs along one, up to rounding."""
-    outside = np.maximum(curve.lower - y, y - curve.upper)
-    violated = outside > 0
-    return bool(np.all(outside[violated] <= _EDGE) and np.all(np.abs(t[violated]) <= _EDGE))
+    excess = np.maximum(curve.lower - y, y - curve.upper)
+    is_violated = excess > 0
+    return bool(np.all(excess[is_violated] <= _LIMIT_ROUNDING) and np.all(np.abs(t[is_violated]) <= _LIMIT_ROUNDING))
 
 
-def _stop_at_limit(curve: Curve, y: Array, t: Array, s: float, outside: Array) -> tuple[CurvePoint, End]:
-    """The first point on a limit before one that is outside, a step s ahead; it lies on the limit exactly."""
-    limits = np.clip(outside, curve.lower, curve.upper)
-    k = np.flatnonzero(limits != outside)
-    here, along = np.tile(y, (len(k), 1)), np.tile(t, (len(k), 1))
+def _stop_at_limit(curve: Curve, y: Array, t: Array, s: float, outer_point: Array) -> tuple[CurvePoint, End]:
+    """The point where a step s from y to a point outside first meets a limit; the point lies on the limit exactly."""
+    limits = np.clip(outer_point, curve.lower, curve.upper)
+    k = np.flatnonzero(limits != outer_point)
+    points, tangents = np.tile(y, (len(k), 1)), np.tile(t, (len(k), 1))
     lengths = find_zeros(
-        lambda r: step_along(curve, here, along, r)[0][range(len(k)), k] - limits[k], np.full(len(k), s)
+        lambda r: step_along(curve, points, tangents, r)[0][range(len(k)), k] - limits[k], np.full(len(k), s)
     )
     lengths = np.nan_to_num(lengths)  # nan: already outside
     first = k[np.argmin(lengths)]
     (last,), (tangent,) = step_along(curve, y[None], t[None], lengths.min(keepdims=True))
     last[first] = limits[first]
-    return CurvePoint(last, tangent), End("max" if outside[first] > limits[first] else "min", int(first))
+    return CurvePoint(last, tangent), End("max" if outer_point[first] > limits[first] else "min", int(first))

@@ -18,23 +18,23 @@ from tmsopt.tracing.events import SAME_PLACE, Event, LocatedEvent, insert_events
 from tmsopt.tracing.points import Points, roots_along
 from tmsopt.tracing.solving import project_rows
 
-_NEAR = 1e-3  # distance within which an EP4 is searched near an EP3 and a 2EP2
-_LOW = 1e-2  # marks below it may touch 0 nearby: they grow with the square of a step of 0.1
-_EXACT = 1e-13  # relative mismatch of a coefficient at an EP4: a few roundings
+_EP4_DISTANCE = 1e-3  # distance within which an EP4 is searched near an EP3 and a 2EP2
+_LOW_MARK = 1e-2  # mark below which the marks may touch 0 nearby, because they grow with the square of a step of 0.1
+_EP4_RESIDUAL = 1e-13  # relative mismatch of a coefficient at an EP4: a few roundings
 _SAME_DESIGN = 1e-6
-"""Like `SAME_PLACE`, for the free parameters alone; the unknowns scatter where the equations are singular."""
-_FITTING = 1e-6  # largest mismatch of a coefficient at a point of a branch
+"""Like `SAME_PLACE`, but for the free parameters only. Where the equations are singular, the unknowns are inexact."""
+_MAX_RESIDUAL = 1e-6  # largest mismatch of a coefficient at a point of a branch
 
-_SQUARE = 1e-9  # relative difference of c from b²/4 below which a quadratic factor has a double root
+_SQUARE_TOLERANCE = 1e-9  # relative difference of c from b²/4 below which a quadratic factor has a double root
 
 _EP4 = Event("EP4", lambda points: points.residual)  # located by equations of its own
 
 RowEvent = tuple[int, Event]
-"""A row of a walk and the event there."""
+"""A row of a walk, and the event at this row."""
 
 
 def make_branches(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Iterator[Branch]:
-    """A walked curve as one branch, or as several if events stop it, with its events among its points."""
+    """A walked curve as a branch, with its events among its points; as several branches if events stop the curve."""
     walk, row_events = find_events(traced, _trim_inexact_ends(traced, walk), events)
     if walk.closed and (stops := [row for row, event in row_events if event.stop]):
         first, around = stops[0], len(walk.y) - 1
@@ -43,10 +43,12 @@ def make_branches(traced: TracedProblem, walk: Walk, events: Sequence[Event] = (
         row_events = [((row - first) % around, event) for row, event in row_events]
         row_events += [(around, event) for row, event in row_events if row == 0]
     stops_at = {row: End(event.name) for row, event in row_events if event.stop}
-    for low, high in pairwise(sorted({0, len(walk.y) - 1, *stops_at})):
-        ends = stops_at.get(low, walk.ends[0]), stops_at.get(high, walk.ends[1])
-        part = Walk(walk.y[low : high + 1], walk.t[low : high + 1], ends)
-        yield make_branch(traced, part, [(row - low, event) for row, event in row_events if low <= row <= high])
+    for first_row, last_row in pairwise(sorted({0, len(walk.y) - 1, *stops_at})):
+        ends = stops_at.get(first_row, walk.ends[0]), stops_at.get(last_row, walk.ends[1])
+        part = Walk(walk.y[first_row : last_row + 1], walk.t[first_row : last_row + 1], ends)
+        yield make_branch(
+            traced, part, [(row - first_row, event) for row, event in row_events if first_row <= row <= last_row]
+        )
 
 
 def find_events(traced: TracedProblem, walk: Walk, events: Sequence[Event]) -> tuple[Walk, list[RowEvent]]:
@@ -64,10 +66,10 @@ def find_events(traced: TracedProblem, walk: Walk, events: Sequence[Event]) -> t
 def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent]) -> Branch:
     """A walk as a branch in the parameters of the problem."""
     problem, pattern, points = traced.problem, traced.pattern, Points(traced, walk.y, walk.t)
-    if pattern.unknowns[-2:] == ("b", "c"):  # a double root of a factor would scatter by 1e-8
+    if pattern.unknowns[-2:] == ("b", "c"):  # rounding would move a double root of a factor by 1e-8
         b, c = (points.x[:, traced.unknowns.stop - k] for k in (2, 1))
         for row in {row for row, event in row_events if "EP" in event.name}:
-            c[row] = b[row] ** 2 / 4 if abs(b[row] ** 2 / 4 - c[row]) <= _SQUARE * abs(c[row]) else c[row]
+            c[row] = b[row] ** 2 / 4 if abs(b[row] ** 2 / 4 - c[row]) <= _SQUARE_TOLERANCE * abs(c[row]) else c[row]
     kinds = pattern.kind(points.unknowns)
     for name in points.special:
         kinds[:] = name
@@ -75,36 +77,36 @@ def make_branch(traced: TracedProblem, walk: Walk, row_events: Sequence[RowEvent
         if event.name in pattern.marks or event.name == "EP4":
             kinds[row] = event.name
     residual, columns = points.residual, points.parameters
-    named = [(row, event.name, event.detail) for row, event in row_events]
+    event_rows = [(row, event.name, event.detail) for row, event in row_events]
     for row, end in () if walk.closed else zip((0, len(points) - 1), walk.ends, strict=True):
-        # where roots meet but eigenvectors do not, the curve is singular
-        crossed = end.reason == SINGULAR and is_crossing(problem, pattern, table_at(columns, row))
-        named.append((row, "end", CROSSING if crossed else describe_end(traced, end)))
-    located = [
+        # where roots coincide but eigenvectors do not, the curve is singular
+        is_crossed = end.reason == SINGULAR and is_crossing(problem, pattern, table_at(columns, row))
+        event_rows.append((row, "end", CROSSING if is_crossed else describe_end(traced, end)))
+    event_points = [
         EventPoint(name, detail, table_at(columns, row), row, float(residual[row]))
-        for row, name, detail in sorted(named, key=lambda n: n[0])
+        for row, name, detail in sorted(event_rows, key=lambda n: n[0])
     ]
     steps = np.diff(walk.y, axis=0)[:, : len(problem.free)]
     return Branch(
         pattern=str(problem.locate),
         parameters=columns,
         unknowns=dict(zip(pattern.unknowns, points.unknowns, strict=True)),
-        tangent=_natural_tangent(points),
+        tangent=_compute_natural_tangent(points),
         arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))]),
         kinds=kinds,
         stable=points.stable,
         heavily_damped=points.heavily_damped,
         satisfied=points.satisfied,
         abscissa=points["abscissa"],
-        events=tuple(located),
+        events=tuple(event_points),
         closed=walk.closed,
         residual=float(np.max(residual)),
-        eigenfrequency=_eigenfrequency(points),
+        eigenfrequency=_compute_eigenfrequency(points),
     )
 
 
-def _eigenfrequency(points: Points) -> dict[str, Array] | None:
-    """The multiple eigenfrequency ω = i s of a complex system, minus the carrier; None for a real system."""
+def _compute_eigenfrequency(points: Points) -> dict[str, Array] | None:
+    """The multiple eigenfrequency ω = i s minus the carrier of a complex system; None for a real system."""
     carrier, pattern = points.traced.problem.model.carrier, points.traced.pattern
     if carrier is None:
         return None
@@ -115,9 +117,9 @@ def _eigenfrequency(points: Points) -> dict[str, Array] | None:
 
 
 def _group_events(located: Sequence[LocatedEvent], free: int) -> list[list[LocatedEvent]]:
-    """Events along the curve, grouped by place; the first of the list is first and gives the place."""
+    """Events in the order of the curve, in groups at one place. In a group, the events keep the order of the list."""
     groups: list[list[int]] = []
-    for k in sorted(range(len(located)), key=lambda k: (located[k].after, located[k].s)):
+    for k in sorted(range(len(located)), key=lambda k: (located[k].row, located[k].s)):
         distance = np.abs(located[k].y - located[groups[-1][-1]].y) if groups else np.array([np.inf])
         if distance.max() > SAME_PLACE * (1 + np.abs(located[k].y).max()) and distance[:free].max() > _SAME_DESIGN:
             groups.append([])
@@ -126,13 +128,13 @@ def _group_events(located: Sequence[LocatedEvent], free: int) -> list[list[Locat
 
 
 def _merge_events(group: Sequence[LocatedEvent], events: Sequence[Event]) -> Iterator[Event]:
-    """The events at one place: the most special package event, with the others in its detail; then the user's."""
+    """The events at one place: the most special package event, whose detail has the others; then the user's events."""
     package_events = [f.event for f in group if f.event not in events]
     if package_events:
         names = {e.name for e in package_events}
         name = "double zero" if {"weave", "capsize"} <= names else package_events[0].name
         folds = dict.fromkeys(e.detail for e in package_events if e.name == "fold")
-        words = [f"next to an {higher}"] if (higher := _find_higher_order(name, names)) else []
+        words = [f"next to an {higher_point}"] if (higher_point := _find_higher_order(name, names)) else []
         for e in package_events:
             if e.name != "fold" and ("EP" not in e.name or e.name == "EP2"):
                 words.append(e.detail if e.name == name else f"{e.name} {e.detail}".strip())
@@ -145,28 +147,28 @@ def _merge_events(group: Sequence[LocatedEvent], events: Sequence[Event]) -> Ite
 
 
 def _find_higher_order(name: str, names: set[str]) -> str:
-    """EP(k+1) if EPk and EP(k−1)+EP2 coincide, the two ways in which it unfolds into EP(k−1); else empty."""
+    """EP(k+1) if EPk and EP(k−1)+EP2 are at one place, since both end in it; empty otherwise."""
     match = re.fullmatch(r"EP(\d+)", name)
     order = int(match[1]) if match else 0
     return f"EP{order + 1}" if ("2EP2" if order == 3 else f"EP{order - 1}+EP2") in names else ""
 
 
-def _natural_tangent(points: Points) -> dict[str, Array]:
-    """Derivatives of the free parameters by the arclength in widths of the box."""
-    problem, along = points.traced.problem, points.t * points.traced.curve.scale / (points.speed[:, None] + 1e-300)
-    of = problem.parameter_set
-    columns = zip(problem.free, along.T, points.x.T, strict=False)
-    return {n: dv / (1 + v**2) if of[n].tangent else dv for n, dv, v in columns}
+def _compute_natural_tangent(points: Points) -> dict[str, Array]:
+    """Derivatives of the free parameters with respect to the arclength, which is in widths of the ranges."""
+    problem, speeds = points.traced.problem, points.t * points.traced.curve.scale / (points.speed[:, None] + 1e-300)
+    parameter_set = problem.parameter_set
+    columns = zip(problem.free, speeds.T, points.x.T, strict=False)
+    return {n: dv / (1 + v**2) if parameter_set[n].tangent else dv for n, dv, v in columns}
 
 
 def _trim_inexact_ends(traced: TracedProblem, walk: Walk) -> Walk:
-    """The walk without end points near infinity whose parameters no longer fit the unknowns."""
+    """The walk without its first and last points, near infinity, whose parameters do not fit the unknowns."""
     with np.errstate(all="ignore"):
-        good = np.flatnonzero(Points(traced, walk.y, walk.t).residual <= _FITTING)
-    if walk.closed or not good.size:
+        good_rows = np.flatnonzero(Points(traced, walk.y, walk.t).residual <= _MAX_RESIDUAL)
+    if walk.closed or not good_rows.size:
         return walk
-    inside = slice(int(good[0]), int(good[-1]) + 1)
-    return replace(walk, y=walk.y[inside], t=walk.t[inside])
+    kept_rows = slice(int(good_rows[0]), int(good_rows[-1]) + 1)
+    return replace(walk, y=walk.y[kept_rows], t=walk.t[kept_rows])
 
 
 def describe_end(traced: TracedProblem, end: End) -> str:
@@ -181,40 +183,44 @@ def describe_end(traced: TracedProblem, end: End) -> str:
 
 
 def _add_exact_EP4(traced: TracedProblem, walk: Walk, located: list[LocatedEvent]) -> list[LocatedEvent]:
-    """The events, each EP4 exact and first; symmetry can take a curve through one, which is then found to 1e-6 only.
+    """The events, in which each EP4 is exact and comes first.
 
-    On a curve of EP2, an EP4 is where the marks of EP3 and 2EP2 vanish at once; in a symmetric section they touch 0.
+    On a curve of EP2, the marks of EP3 and 2EP2 both vanish at an EP4. If the section is symmetric, they only touch 0,
+    and locate the EP4 to 1e-6 only.
     """
-    near = [f for f in located if f.event.name == "EP4"]
+    candidates = [f for f in located if f.event.name == "EP4"]
     if traced.pattern.form == "EP2" and {"EP3", "2EP2"} <= {*traced.pattern.marks}:
-        _, refined = insert_events(walk, located)
-        points = Points(traced, refined.y, refined.t)
+        _, refined_walk = insert_events(walk, located)
+        points = Points(traced, refined_walk.y, refined_walk.t)
         height = np.abs(points.mark("EP3")) + np.abs(points.mark("2EP2"))
-        least = (height[1:-1] <= height[:-2]) & (height[1:-1] <= height[2:]) & (height[1:-1] < _LOW)
-        near += [LocatedEvent(_EP4, refined.y[k], refined.t[k], k, 0.0) for k in (np.flatnonzero(least) + 1).tolist()]
-    return [*filter(None, (_exact_EP4(traced, walk, f) for f in near)), *located]
+        is_minimum = (height[1:-1] <= height[:-2]) & (height[1:-1] <= height[2:]) & (height[1:-1] < _LOW_MARK)
+        candidates += [
+            LocatedEvent(_EP4, refined_walk.y[k], refined_walk.t[k], k, 0.0)
+            for k in (np.flatnonzero(is_minimum) + 1).tolist()
+        ]
+    return [*filter(None, (_solve_EP4(traced, walk, f) for f in candidates)), *located]
 
 
-def _exact_EP4(traced: TracedProblem, walk: Walk, located: LocatedEvent) -> LocatedEvent | None:
-    """The EP4 next to an event, by its own equations; None if there is none."""
+def _solve_EP4(traced: TracedProblem, walk: Walk, located: LocatedEvent) -> LocatedEvent | None:
+    """The EP4 next to an event, computed from the equations of an EP4; None without an EP4."""
     problem, pattern, scale = traced.problem, traced.pattern, traced.curve.scale
     free, EP4 = len(problem.free), pattern_of("EP4", problem.model.degree)
     at_EP4 = prepare_tracing(problem.derive(constraints={}), EP4)
     start, unit = located.y * scale, at_EP4.curve.scale
     guess = _convert_unknowns(pattern, start[traced.unknowns], at_EP4.pattern)
     (end,) = project_rows(at_EP4.curve.evaluate, np.array([[*start[:free], *guess]]) / unit, [None])
-    if not np.abs(end[:free] - located.y[:free]).max() <= _NEAR:  # nan where nothing is found
+    if not np.abs(end[:free] - located.y[:free]).max() <= _EP4_DISTANCE:  # nan where nothing is found
         return None
-    if Points(at_EP4, end[None], located.t[None]).residual[0] > _EXACT:
-        return None  # a section next to an EP4, not through it
+    if Points(at_EP4, end[None], located.t[None]).residual[0] > _EP4_RESIDUAL:
+        return None  # the section lies next to an EP4, not through it
     exact = located.y.copy()
     exact[:free] = end[:free]
     exact[traced.unknowns] = _convert_unknowns(at_EP4.pattern, (end * unit)[free:], pattern) / scale[traced.unknowns]
     k = int(np.argmin(np.abs(walk.y - exact).max(axis=1)))
-    after = k if walk.t[k] @ (exact - walk.y[k]) >= 0 else max(k - 1, 0)
-    return LocatedEvent(_EP4, exact, located.t, after, float(walk.t[after] @ (exact - walk.y[after])))
+    row = k if walk.t[k] @ (exact - walk.y[k]) >= 0 else max(k - 1, 0)
+    return LocatedEvent(_EP4, exact, located.t, row, float(walk.t[row] @ (exact - walk.y[row])))
 
 
-def _convert_unknowns(pattern: Pattern, unknowns: Array, other: Pattern) -> Array:
+def _convert_unknowns(pattern: Pattern, unknowns: Array, target: Pattern) -> Array:
     """The unknowns of another pattern, for the same roots."""
-    return np.array(other.guesses(roots_along(pattern.factors(list(unknowns)), 1)[0])[0])
+    return np.array(target.guesses(roots_along(pattern.factors(list(unknowns)), 1)[0])[0])

@@ -1,7 +1,7 @@
 """The domains of asymptotic stability and of heavy damping in a plane, bounded by exact curves.
 
-Each arc of a boundary is a traced root pattern, not a contour of a grid. It is cut where the other roots are no longer
-left of the imaginary axis, or real.
+Each arc of a boundary is a traced root pattern, not a contour of a grid. The arc ends where the other roots stop being
+left of the imaginary axis, or stop being real.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,20 +24,20 @@ from tmsopt.tracing.infinity import InfinityCurve, find_infinity_curves
 from tmsopt.tracing.points import is_on_axis, roots_along
 from tmsopt.tracing.trace import STARTS, STEP, trace
 
-_CLOSE = 5e-3
+_CORNER_DISTANCE = 5e-3
 """Largest distance, in widths of the box, from an end at infinity or a singular end to its corner."""
 
-_EDGE = 1e-9  # widths of the box: largest distance from an edge of a branch that lies in it
+_EDGE_DISTANCE = 1e-9  # largest distance, in widths of the box, of a branch from an edge in which it lies
 
-_OFFSET = 1e-4  # widths of the box from a curve to the designs that test its sides
+_SIDE_OFFSET = 1e-4  # distance, in widths of the box, from a curve to the designs that test its two sides
 
 
 @dataclass(frozen=True)
 class Arc:
-    """A piece of a boundary.
+    """A smooth part of a boundary.
 
     Attributes:
-        kind: root pattern on it: ``weave``, ``capsize``, ``infinity`` (a root passes through infinity), ``EP2``.
+        kind: root pattern on the arc: ``weave``, ``capsize``, ``infinity`` (a root passes through infinity), ``EP2``.
         points: name of a free parameter → values along the arc.
     """
 
@@ -47,9 +47,9 @@ class Arc:
 
 @dataclass(frozen=True)
 class Corner:
-    """A point where arcs of a boundary meet or turn back: ``EP3`` is a cusp, ``2EP2`` a crossing.
+    """A point where arcs of a boundary meet or turn back: ``EP3`` is a cusp, ``2EP2`` is a crossing.
 
-    At ``infinity and weave`` a weave boundary meets a0 = 0; at ``infinity`` two roots go to infinity at once.
+    At ``infinity and weave`` a weave boundary meets the curve a0 = 0. At ``infinity`` two roots go to infinity.
     """
 
     name: str
@@ -59,13 +59,13 @@ class Corner:
 
 @dataclass(frozen=True, repr=False)
 class Domain(Printable):
-    """Boundaries inside a box. They end at its edges; a boundary that lies in an edge is left out.
+    """Boundaries inside a box. They end at the edges of the box. A boundary that lies in an edge is left out.
 
     Attributes:
         stability: arcs that bound asymptotic stability.
         heavy_damping: arcs that bound the designs whose roots are all real and negative.
-        parting: arcs that separate capsize from weave among the unstable designs: two positive real roots merge, or
-            one passes 0 or infinity, while no other root is real and positive.
+        parting: arcs that separate capsize from weave among the unstable designs. There, two positive real roots merge,
+            or one real root passes 0 or infinity, and no other root is real and positive.
         corners: corners of the first two boundaries.
 
     Example:
@@ -105,18 +105,20 @@ def domain(
     plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
     bounding = ("weave", "capsize", "EP2") if plane.model.carrier is None else ("weave",)
     traces = (trace(plane, name, step=step, starts=starts, seed=seed, progress=progress) for name in bounding)
-    found = {traced.pattern: [b for b in traced.branches if not _is_in_edge(b, plane)] for traced in traces}
+    branches_of = {traced.pattern: [b for b in traced.branches if not _is_in_edge(b, plane)] for traced in traces}
     start_steps(progress, "looking for corners")
     infinite = list(find_infinity_curves(plane, step, starts, seed))
     at_infinity = [c for curve in infinite for c in _list_changes(curve)]
 
-    def arcs(names: Sequence[str], bounds: Callable[[Branch], Truth], beyond: str) -> tuple[Arc, ...]:
-        traced = (arc for n in names for b in found.get(n, ()) for arc in _cut_arcs(b, bounds(b), plane, at_infinity))
-        runs = ((curve.parameters, *run) for curve in infinite for run in _find_runs(getattr(curve, beyond)))
-        ends = (Arc("infinity", {n: x[start : stop + 1] for n, x in p.items()}) for p, start, stop in runs)
+    def arcs(names: Sequence[str], bounds: Callable[[Branch], Truth], side: str) -> tuple[Arc, ...]:
+        traced = (
+            arc for n in names for b in branches_of.get(n, ()) for arc in _cut_arcs(b, bounds(b), plane, at_infinity)
+        )
+        runs = ((curve.parameters, run) for curve in infinite for run in _find_runs(getattr(curve, side)))
+        ends = (Arc("infinity", {n: x[start : stop + 1] for n, x in p.items()}) for p, (start, stop) in runs)
         return (*traced, *ends)
 
-    corners = [c for branches in found.values() for b in branches for c in _list_corners(b, plane)]
+    corners = [c for branches in branches_of.values() for b in branches for c in _list_corners(b, plane)]
     corners += [c for curve in infinite for c in _list_changes(curve, corners=True)]
     return Domain(
         stability=arcs(("weave", "capsize"), lambda b: _bounds_stability(b, plane), "stable"),
@@ -127,108 +129,112 @@ def domain(
 
 
 def _is_in_edge(branch: Branch, problem: Posed) -> bool:
-    """Whether a branch lies in an edge of the box; it then bounds the picture anyway."""
+    """Whether a branch lies in an edge of the box, which bounds the domain anyway."""
     limits = ((branch.parameters[n], limit, np.ptp(ends)) for n, ends in problem.free.items() for limit in ends)
-    return any(np.abs(column - limit).max() <= _EDGE * width for column, limit, width in limits)
+    return any(np.abs(column - limit).max() <= _EDGE_DISTANCE * width for column, limit, width in limits)
 
 
-def _find_runs(inside: Truth) -> list[tuple[int, int]]:
-    """Begin and end of each run of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+def _find_runs(is_inside: Truth) -> list[list[int]]:
+    """First index of each run of true values, and the index after its last one."""
+    runs: list[list[int]] = np.flatnonzero(np.diff(is_inside.astype(int), prepend=0, append=0)).reshape(-1, 2).tolist()
+    return runs
 
 
 def _list_changes(curve: InfinityCurve, corners: bool = False) -> Iterator[Corner]:
-    """Points on a0 = 0 where another boundary meets it; `corners`: only those of stability or heavy damping."""
+    """Points where another boundary meets the curve a0 = 0.
+
+    Args:
+        corners: list only the points where a boundary of stability or of heavy damping changes.
+    """
     for row, event in curve.changes.items():
         if not corners or any(b[row - 1] != b[row] for b in (curve.stable, curve.heavily_damped)):
             name, detail = (f"infinity and {event}", "a0 = 0") if event != "infinity" else ("infinity", "a0 = a1 = 0")
             yield Corner(name, detail, table_at(curve.parameters, row))
 
 
-def _cut_arcs(branch: Branch, inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
-    """Runs of points that bound a domain, with the events at their ends and a corner beyond an end."""
-    marked, beyond = inside.copy(), dict[int, Corner]()
+def _cut_arcs(branch: Branch, is_inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
+    """Runs of points that bound a domain, with the events at their ends, and with a corner next to an end."""
+    is_bound, corner_at = is_inside.copy(), dict[int, Corner]()
     for event in branch.events:
         k = event.index
         if event.name != "end":
-            marked[k] = bool(inside[max(k - 1, 0)] or inside[min(k + 1, len(branch) - 1)])
+            is_bound[k] = bool(is_inside[max(k - 1, 0)] or is_inside[min(k + 1, len(branch) - 1)])
         elif event.detail.startswith((INFINITE, SINGULAR)) and at_infinity:
-            here, widths = event.parameters, {n: high - low for n, (low, high) in problem.free.items()}
-            apart = [max(abs(here[n] - c.parameters[n]) / w for n, w in widths.items()) for c in at_infinity]
-            if min(apart) <= _CLOSE:
-                beyond[k] = at_infinity[int(np.argmin(apart))]
-    for start, stop in _find_runs(marked):
+            parameters, widths = event.parameters, {n: high - low for n, (low, high) in problem.free.items()}
+            distances = [max(abs(parameters[n] - c.parameters[n]) / w for n, w in widths.items()) for c in at_infinity]
+            if min(distances) <= _CORNER_DISTANCE:
+                corner_at[k] = at_infinity[int(np.argmin(distances))]
+    for start, stop in _find_runs(is_bound):
         if stop - start > 1:
-            before, after = ([beyond[k].parameters] if k in beyond else [] for k in (start, stop - 1))
-            columns = {n: [p[n] for p in before] + [*branch.parameters[n][start:stop]] for n in problem.free}
-            yield Arc(branch.pattern, {n: np.array(c + [p[n] for p in after]) for n, c in columns.items()})
+            first_corner, last_corner = ([corner_at[k].parameters] if k in corner_at else [] for k in (start, stop - 1))
+            columns = {n: [p[n] for p in first_corner] + [*branch.parameters[n][start:stop]] for n in problem.free}
+            yield Arc(branch.pattern, {n: np.array(c + [p[n] for p in last_corner]) for n, c in columns.items()})
 
 
 def _bounds_stability(branch: Branch, problem: Posed) -> Truth:
-    """Where the other roots are stable, or on the axis with stable designs on one side only.
+    """Where the other roots are stable, or are on the axis and the designs on exactly one side are stable.
 
-    If several pairs stay on the axis together, each on its curve, the curve of the fastest counts.
+    If several pairs are on the axis along several curves, only the curve of the fastest pair counts.
     """
-    rest = pattern_of(problem.model, branch.pattern).remaining_factors(list(branch.unknowns.values()))
-    z = roots_along(rest, len(branch))
-    tied = np.where(is_on_axis(z), np.abs(z) ** 2, -1.0).max(axis=-1, initial=-1.0)  # of the fastest, squared
-    if np.all(tied < 0):
+    other_factors = pattern_of(problem.model, branch.pattern).remaining_factors(list(branch.unknowns.values()))
+    z = roots_along(other_factors, len(branch))
+    # squared frequency of the fastest pair on the axis
+    axis_frequency = np.where(is_on_axis(z), np.abs(z) ** 2, -1.0).max(axis=-1, initial=-1.0)
+    if np.all(axis_frequency < 0):
         return branch.stable
-    (x, dx, wide), (y, dy, high) = (
-        (branch.parameters[n], branch.tangent[n] / (end - begin), end - begin)
-        for n, (begin, end) in problem.free.items()
+    (x, dx, x_width), (y, dy, y_width) = (
+        (branch.parameters[n], branch.tangent[n] / (end - low), end - low) for n, (low, end) in problem.free.items()
     )
-    offset = np.array([[-_OFFSET], [_OFFSET]]) / (np.hypot(dx, dy) + 1e-300)
-    sides = dict(zip(problem.free, (x - offset * wide * dy, y + offset * high * dx), strict=True))
+    offset = np.array([[-_SIDE_OFFSET], [_SIDE_OFFSET]]) / (np.hypot(dx, dy) + 1e-300)
+    sides = dict(zip(problem.free, (x - offset * x_width * dy, y + offset * y_width * dx), strict=True))
     with np.errstate(all="ignore"):  # outside the model's range nan is not stable
-        one, other = is_stable(compute_coefficients(problem, sides))
-    fastest = (tied >= 0) & (branch.unknowns.get("W", np.inf) >= tied)
-    return np.asarray(branch.stable | (fastest & (one != other)))
+        stable_on_left, stable_on_right = is_stable(compute_coefficients(problem, sides))
+    fastest = (axis_frequency >= 0) & (branch.unknowns.get("W", np.inf) >= axis_frequency)
+    return np.asarray(branch.stable | (fastest & (stable_on_left != stable_on_right)))
 
 
 def _parts_instabilities(branch: Branch) -> Truth:
-    """Where one side has a positive real root and the other, also unstable, has none."""
-    rest = _other_roots(branch)
-    found = branch.unknowns["r"] > 0 if branch.pattern == "EP2" else ~branch.stable
-    if len(rest) > 1:
-        found[found] = real_roots(np.stack(rest, axis=-1)[found])[1] == 0
-    return np.asarray(found)
+    """Where both sides are unstable, and exactly one side has a positive real root."""
+    other_factor = _find_other_factor(branch)
+    is_parting = branch.unknowns["r"] > 0 if branch.pattern == "EP2" else ~branch.stable
+    if len(other_factor) > 1:
+        is_parting[is_parting] = real_roots(np.stack(other_factor, axis=-1)[is_parting])[1] == 0
+    return is_parting
 
 
-def _other_roots(branch: Branch) -> list[Any]:
-    """The other roots of a curve of double roots or of roots 0, as one factor; [1] if there are none."""
+def _find_other_factor(branch: Branch) -> list[Any]:
+    """Along a curve of double roots or of roots 0, the factor of the other roots; [1] without other roots."""
     return [np.ones(len(branch)), *(column for name, column in branch.unknowns.items() if name != "r")]
 
 
 def _is_drawn_here(branch: Branch) -> Truth:
-    """Where a curve of two double roots is parametrised by the larger; the other draws the same curve again."""
+    """Where r is the larger of two double roots; with the smaller one, the same curve would be drawn twice."""
     if not np.any(branch.kinds == "2EP2"):
         return np.ones(len(branch), dtype=bool)
-    r, other = branch.unknowns["r"], nearest_pair_mean(_other_roots(branch))
-    return np.asarray((branch.kinds != "2EP2") | (r - other >= -1e-12 * np.abs(other)))
+    r, second_root = branch.unknowns["r"], nearest_pair_mean(_find_other_factor(branch))
+    return np.asarray((branch.kinds != "2EP2") | (r - second_root >= -1e-12 * np.abs(second_root)))
 
 
 def _list_corners(branch: Branch, problem: Posed) -> Iterator[Corner]:
     """Events where a boundary of a domain turns, crosses another or ends inside the box."""
-    inside = branch.heavily_damped if branch.pattern == "EP2" else branch.stable
+    is_inside = branch.heavily_damped if branch.pattern == "EP2" else branch.stable
     ends = pattern_of(problem.model, branch.pattern).ends.values()
     for event in branch.events:
         turns = event.detail in ends if event.name == "end" else event.name not in ("fold", "constraint")
-        if turns and np.any(inside[max(event.index - 1, 0) : event.index + 2]):
+        if turns and np.any(is_inside[max(event.index - 1, 0) : event.index + 2]):
             name = "double zero" if event.name == "end" else event.name
             yield Corner(name, event.detail, {n: event.parameters[n] for n in problem.free})
 
 
 def _merge_corners(corners: Sequence[Corner]) -> list[Corner]:
-    """Each place once, with all its names: weave and capsize arcs that meet both end there."""
-    found: list[Corner] = []
+    """Each place once, with all its names: where a weave arc meets a capsize arc, both have a corner."""
+    merged: list[Corner] = []
     for corner in corners:
-        for k, other in enumerate(found):
-            if np.allclose(list(corner.parameters.values()), list(other.parameters.values()), rtol=1e-7, atol=1e-9):
-                names = dict.fromkeys([*other.name.split(" and "), *corner.name.split(" and ")])
-                found[k] = replace(other, name=" and ".join(names))
+        for k, earlier in enumerate(merged):
+            if np.allclose(list(corner.parameters.values()), list(earlier.parameters.values()), rtol=1e-7, atol=1e-9):
+                names = dict.fromkeys([*earlier.name.split(" and "), *corner.name.split(" and ")])
+                merged[k] = replace(earlier, name=" and ".join(names))
                 break
         else:
-            found.append(corner)
-    return found
+            merged.append(corner)
+    return merged

@@ -20,8 +20,8 @@ from tmsopt.roots import Pattern
 from tmsopt.tracing.continuation import Curve, compile_curve
 from tmsopt.tracing.solving import map_rows
 
-_SAMPLE = 32  # designs from which sizes of the unknowns are estimated
-_VANISHED = 1e-9
+_SAMPLE_SIZE = 32  # designs from which sizes of the unknowns are estimated
+_MIN_LEADING = 1e-9
 
 
 def compute_coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
@@ -35,8 +35,8 @@ class TracedProblem:
     """A problem prepared for tracing one pattern.
 
     Attributes:
-        problem: with the pattern to locate and every constraint.
-        unit: of the variables of the NLP, in natural units.
+        problem: the problem, which has the pattern to locate and every constraint.
+        unit: units of the variables of the NLP, in natural units.
         unknowns: indices of the pattern's unknowns among the variables.
     """
 
@@ -48,18 +48,22 @@ class TracedProblem:
     unknowns: slice
 
     def has_leading_coefficient(self, a: Array) -> Truth:
-        """Whether a0 is not negligible, for a of shape (…, n + 1): with a0 = a1 = … = 0 any factors fit."""
+        """Whether a0 is not negligible, for a of shape (…, n + 1). If all coefficients are 0, any factors fit."""
         size = np.abs(a) / self.nlp.unit ** np.arange(a.shape[-1])
-        return np.asarray(size[..., 0] > _VANISHED * size.max(axis=-1))
+        return np.asarray(size[..., 0] > _MIN_LEADING * size.max(axis=-1))
 
     def list_starts(self, design: Mapping[str, float], best_first: bool) -> list[Array]:
-        """All variables at a design, in units of the scale, for each guess of the unknowns; sorted if `best_first`."""
-        every = [x * self.unit / self.curve.scale for x in complete_starts(self.nlp, self.problem, design)]
-        return sorted(every, key=lambda y: best_first and np.abs(map_rows(self.curve.evaluate, y[None])[0]).max())
+        """All variables at a design, in units of the scale, for each guess of the unknowns.
+
+        Args:
+            best_first: sort the guesses by their residuals.
+        """
+        points = [x * self.unit / self.curve.scale for x in complete_starts(self.nlp, self.problem, design)]
+        return sorted(points, key=lambda y: best_first and np.abs(map_rows(self.curve.evaluate, y[None])[0]).max())
 
 
 def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracedProblem:
-    """Compile the equations of a pattern, by default the one that the problem locates."""
+    """Compile the equations of a pattern; by default the pattern that the problem locates."""
     pattern, free = pattern or pattern_of(problem.model, str(problem.locate)), len(problem.free)
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
     nlp = formulate_matching(problem.derive(constraints=equalities), pattern)
@@ -78,7 +82,9 @@ def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracedPro
             lower[free + k] = 0.0
     scale = unit.copy()
     scale[:free] = upper[:free] - lower[:free]
-    sample = (next(complete_starts(nlp, problem, design), None) for design in islice(sample_box(problem, 0), _SAMPLE))
+    sample = (
+        next(complete_starts(nlp, problem, design), None) for design in islice(sample_box(problem, 0), _SAMPLE_SIZE)
+    )
     if guesses := [guess for guess in sample if guess is not None]:
         scale[free:] = (unit * np.clip(np.median(np.abs(guesses), axis=0), 0.1, 1e3))[free:]
     return TracedProblem(
@@ -88,8 +94,8 @@ def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracedPro
 
 def design_at(problem: Posed, x: Array) -> dict[str, Any]:
     """Free parameters from traced variables, as floats or columns."""
-    of = problem.parameter_set
-    return {n: np.arctan(v) if of[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
+    parameter_set = problem.parameter_set
+    return {n: np.arctan(v) if parameter_set[n].tangent else v for n, v in zip(problem.free, x.T, strict=False)}
 
 
 def limits_of(problem: Posed) -> tuple[Array, Array]:

@@ -1,7 +1,7 @@
 """Events: functions of the points of a curve, whose zeros are located on the curve to rounding.
 
-Events of the package and of the user are treated alike. A function may have two zeros between two steps; where it comes
-near 0, `refine_walk` adds the point at which it is nearest.
+Events of the package and of the user are treated in the same way. A function may have two zeros between two steps.
+Where a function comes near 0, `refine_walk` adds the point at which it is nearest to 0.
 """
 
 import re
@@ -21,16 +21,18 @@ from tmsopt.tracing.points import NOTHING, Points, axis_functions
 from tmsopt.tracing.solving import find_zeros
 
 SAME_PLACE = 1e-6
-"""Events closer than this, in units of the scale, are at one place; each is located to 1e-12 or better."""
+"""Distance, in units of the scale, up to which events are at one place; each is located to 1e-12 or better."""
 
 CHANGES = "stability changes"
-"""Detail of weave and capsize events, which count only where stability changes."""
+"""Detail of weave and capsize events, which are listed only where stability changes."""
 
-_OWN = r"weave|capsize|fold|constraint|end|(double|\d+-fold) zero|\d*C?EP\d\S*"  # names of events of the package
-_DIP = 0.5
-"""A minimum between two steps is searched if a parabola falls by this share of the value there."""
-_ASTRAY = 2.0  # arclengths: a point further away lies on another curve, as may happen near a singular point
-_ROUNDING = 1e-14  # of a variable of order 1
+_PACKAGE_NAMES = (
+    r"weave|capsize|fold|constraint|end|(double|\d+-fold) zero|\d*C?EP\d\S*"  # names of events of the package
+)
+_MIN_DIP = 0.5
+"""A minimum between two steps is searched if a parabola predicts a fall by at least this share of the value."""
+_MAX_DEVIATION = 2.0  # in arclengths; a point farther away lies on another curve, as may happen near a singular point
+_ROUNDING = 1e-14  # rounding error of a variable of order 1
 
 
 @dataclass(frozen=True)
@@ -38,10 +40,10 @@ class Event:
     """A place on a curve where a function changes its sign.
 
     Attributes:
-        name: one line, shown wherever the curve is shown.
+        name: one line of text, which is shown with the curve.
         function: point → number. The point is a mapping: ``p["Fr"]`` is a parameter of the problem, ``p["abscissa"]`` a
             quantity of its model, ``p["r"]`` an unknown of the pattern.
-        stop: whether the branch ends there. The curve after it is another branch.
+        stop: whether the branch ends at the event. The curve after the event is another branch.
         detail: words to show next to the name.
 
     Example:
@@ -63,20 +65,21 @@ class Event:
 
 @dataclass(frozen=True)
 class LocatedEvent:
-    """A zero of an event at an arclength s after the row `after` of a walk."""
+    """A zero of an event at an arclength s after a row of a walk."""
 
     event: Event
     y: Array
     t: Array
-    after: int
+    row: int
     s: float
 
 
 def check_events(events: Any) -> list[Event]:
-    """The events of a user as functions of many `Points`, like those of the package.
+    """The events of a user as functions of many `Points`, as the events of the package are.
 
     Raises:
-        InputError: for anything but a list of events; later, where a function raises or returns no finite number.
+        InputError: if this is no list of events. Later, the functions raise it if a user's function raises or returns
+            no finite number.
     """
     faults = list_faults("events", events, "[tmsopt.Event('Fr is 3', lambda p: p['Fr'] - 3)]")
     for k, event in enumerate(() if faults else events):
@@ -86,7 +89,7 @@ def check_events(events: Any) -> list[Event]:
             )
         elif wrong := text_faults(event.name, "events", f"{k}", "name"):
             faults += wrong
-        elif re.fullmatch(_OWN, event.name):
+        elif re.fullmatch(_PACKAGE_NAMES, event.name):
             message = f"found '{event.name}', the name of a built-in event; accepted: another name"
             faults.append(Fault(message, ("events", f"{k}", "name")))
     if faults:
@@ -95,9 +98,11 @@ def check_events(events: Any) -> list[Event]:
 
 
 def _evaluate_points(event: Event, points: Points) -> Array:
-    """The function at every point; nan where there is no point."""
-    exist = np.all(np.isfinite(points.x), axis=1)
-    return np.array([_evaluate_at(event, _PointView(points, k)) if there else np.nan for k, there in enumerate(exist)])
+    """The user's function at every point; nan where the point does not exist."""
+    is_finite = np.all(np.isfinite(points.x), axis=1)
+    return np.array(
+        [_evaluate_at(event, _PointView(points, k)) if exists else np.nan for k, exists in enumerate(is_finite)]
+    )
 
 
 def _evaluate_at(event: Event, point: Mapping[str, float]) -> float:
@@ -105,16 +110,18 @@ def _evaluate_at(event: Event, point: Mapping[str, float]) -> float:
         value = event.function(point)
         if is_number(value):
             return float(value)
-        what = f"the function returns {short(value)}"
+        problem_text = f"the function returns {short(value)}"
     except Exception as error:
-        what = f"the function raises {type(error).__name__}: {error}"
+        problem_text = f"the function raises {type(error).__name__}: {error}"
     place = ", ".join(f"{name} = {point[name]:.6g}" for name in point)
-    raise input_error(f"{what} at {place}; accepted: a finite number at every point of the curve", "events", event.name)
+    raise input_error(
+        f"{problem_text} at {place}; accepted: a finite number at every point of the curve", "events", event.name
+    )
 
 
 @dataclass(frozen=True)
 class _PointView(Mapping[str, float]):
-    """One of many points, as a user's function sees it; iteration lists the free parameters."""
+    """One point as the argument of a user's function; iteration lists the free parameters."""
 
     points: Points
     row: int
@@ -154,11 +161,11 @@ def list_package_events(points: Points) -> Iterator[Event]:
 
 
 def locate_events(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Iterator[LocatedEvent]:
-    """Every zero of an event between the rows that show its change of sign."""
+    """Every zero of an event between two rows at which its function has different signs."""
     points, free = Points(traced, walk.y, walk.t), list(traced.problem.free)
     for event, values in _list_active(points, events):
         for located in locate_zeros(traced.curve, walk, partial(Points, traced), event, values):
-            y, row = located.y, located.after
+            y, row = located.y, located.row
             changes = event.name not in ("weave", "capsize") or points.stable[row] != points.stable[row + 1]
             if changes and (event.name != "fold" or _is_fold(walk, row, y, free.index(event.detail))):
                 yield located
@@ -167,42 +174,57 @@ def locate_events(traced: TracedProblem, walk: Walk, events: Sequence[Event] = (
 def locate_zeros(
     curve: Curve, walk: Walk, make_points: Callable[[Array, Array], Any], event: Event, values: Array
 ) -> Iterator[LocatedEvent]:
-    """Zeros of an event between rows with a change of sign; its function takes what `make_points` returns."""
+    """Zeros of an event between rows with a change of sign; `make_points` makes the argument of its function."""
     rows = np.flatnonzero(has_sign_change(values))
-    here, along = walk.y[rows], walk.t[rows]
-    ends = np.sum(along * (walk.y[rows + 1] - here), axis=1)
+    points, tangents = walk.y[rows], walk.t[rows]
+    ends = np.sum(tangents * (walk.y[rows + 1] - points), axis=1)
     if rows.size:
-        s = find_zeros(lambda s: event.function(make_points(*step_along(curve, here, along, s))), ends)
-        real = np.isfinite(s)  # else a pole, noise, or nan
-        located = zip(
-            *step_along(curve, here[real], along[real], s[real]), rows[real].tolist(), s[real].tolist(), strict=True
+        s = find_zeros(lambda s: event.function(make_points(*step_along(curve, points, tangents, s))), ends)
+        real = np.isfinite(s)  # otherwise the sign changes at a pole, by noise, or at nan
+        zeros = zip(
+            *step_along(curve, points[real], tangents[real], s[real]),
+            rows[real].tolist(),
+            s[real].tolist(),
+            strict=True,
         )
-        for y, t, row, length in located:
-            if np.abs(y - walk.y[row]).max() <= _ASTRAY * length + SAME_PLACE:  # else on another curve
+        for y, t, row, length in zeros:
+            if (
+                np.abs(y - walk.y[row]).max() <= _MAX_DEVIATION * length + SAME_PLACE
+            ):  # otherwise it is on another curve
                 yield LocatedEvent(event, y, t, row, length)
 
 
 def has_sign_change(value: Array) -> Truth:
-    """Where a sequence changes sign to the next entry; a 0 takes the sign before it, or else after it."""
+    """Where a sequence changes sign from an entry to the next. A 0 takes the sign before it, or the sign after it."""
     sign = np.sign(value)
-    if (known := np.flatnonzero(sign)).size:
-        sign = sign[known[np.maximum(np.searchsorted(known, range(len(sign)), side="right") - 1, 0)]]
-    return np.asarray(sign[1:] * sign[:-1] < 0)
+    if (nonzero := np.flatnonzero(sign)).size:
+        sign = sign[nonzero[np.maximum(np.searchsorted(nonzero, range(len(sign)), side="right") - 1, 0)]]
+    return sign[1:] * sign[:-1] < 0
 
 
 def refine_walk(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Walk:
-    """The walk with added points where an event comes nearest to 0 between two steps, so that two zeros show."""
+    """The walk with added points where an event is nearest to 0 between two steps.
+
+    Without these points, two zeros between two steps would show no change of sign.
+    """
     steps = np.sum(walk.t[:-1] * np.diff(walk.y, axis=0), axis=1)
-    before, after = steps[:-1], steps[1:]
+    step_before, step_after = steps[:-1], steps[1:]
     minima: dict[tuple[int, float], LocatedEvent] = {}
     for event, value in _list_active(Points(traced, walk.y, walk.t), events):
         side = np.sign(value[1:-1])
-        left, here, right = side * value[:-2], side * value[1:-1], side * value[2:]
+        value_before, value_here, value_after = side * value[:-2], side * value[1:-1], side * value[2:]
         with np.errstate(all="ignore"):  # slope and second derivative of the parabola through three values
-            back, ahead = (here - left) / before, (right - here) / after
-            slope, bend = (back * after + ahead * before) / (before + after), 2 * (ahead - back) / (before + after)
-            dips = (here <= left) & (here <= right) & (bend > 0) & (slope**2 / (2 * bend) > _DIP * here)
-        for k in np.flatnonzero(dips & (before > 0) & (after > 0) & (here > 0)).tolist():
+            slope_before = (value_here - value_before) / step_before
+            slope_after = (value_after - value_here) / step_after
+            slope = (slope_before * step_after + slope_after * step_before) / (step_before + step_after)
+            bend = 2 * (slope_after - slope_before) / (step_before + step_after)
+            dips = (
+                (value_here <= value_before)
+                & (value_here <= value_after)
+                & (bend > 0)
+                & (slope**2 / (2 * bend) > _MIN_DIP * value_here)
+            )
+        for k in np.flatnonzero(dips & (step_before > 0) & (step_after > 0) & (value_here > 0)).tolist():
             row = walk.y[[k + 1]], walk.t[[k + 1]]
 
             def height(s: float, event: Event = event, row: tuple[Array, Array] = row, sign: float = side[k]) -> float:
@@ -210,37 +232,44 @@ def refine_walk(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ())
 
             from scipy.optimize import minimize_scalar  # importing it takes 0.2 s
 
-            least = minimize_scalar(height, bounds=(-before[k], after[k]), method="bounded", options={"xatol": 1e-14})
-            s, nearby = float(least.x), step_along(traced.curve, *row, np.array([least.x]))
-            # again, since Newton's method converges slowly near singular points
+            minimum = minimize_scalar(
+                height, bounds=(-step_before[k], step_after[k]), method="bounded", options={"xatol": 1e-14}
+            )
+            s, nearby = float(minimum.x), step_along(traced.curve, *row, np.array([minimum.x]))
+            # correct the point again, since Newton's method converges slowly near singular points
             (y,), (t,) = step_along(traced.curve, *nearby, np.zeros(1))
-            if np.abs(y - row[0][0]).max() <= _ASTRAY * abs(s) and t @ row[1][0] > 0:
-                place = (k + 1, s) if s >= 0 else (k, before[k] + s)
+            if np.abs(y - row[0][0]).max() <= _MAX_DEVIATION * abs(s) and t @ row[1][0] > 0:
+                place = (k + 1, s) if s >= 0 else (k, step_before[k] + s)
                 minima.setdefault(place, LocatedEvent(event, y, t, *place))
     return insert_events(walk, [minima[place] for place in sorted(minima)])[1]
 
 
 def insert_events(walk: Walk, located: Sequence[LocatedEvent]) -> tuple[list[int], Walk]:
     """The rows of the events, in order, and the walk with them among its points."""
-    order = np.argsort([*range(len(walk.y)), *(f.after + 0.5 for f in located)], kind="stable")
+    order = np.argsort([*range(len(walk.y)), *(f.row + 0.5 for f in located)], kind="stable")
     y, t = np.array([*walk.y, *(f.y for f in located)]), np.array([*walk.t, *(f.t for f in located)])
     return np.flatnonzero(order >= len(walk.y)).tolist(), replace(walk, y=y[order], t=t[order])
 
 
 def _list_active(points: Points, events: Iterable[Event]) -> Iterator[tuple[Event, Array]]:
     """The events whose functions are not 0 all along the curve, with their values."""
-    special = points.special
+    special_names = points.special
     for event in (*list_package_events(points), *events):
         value = points.column(event.function(points))
-        if event.name not in special and (event.name != "fold" or np.abs(value).max() > NOTHING):
+        if event.name not in special_names and (event.name != "fold" or np.abs(value).max() > NOTHING):
             yield event, value
 
 
 def _is_fold(walk: Walk, i: int, y: Array, k: int) -> bool:
-    """Whether the neighbours of a point, next or next but one, are on one side of it by more than rounding.
+    """Whether the next points, or the points after them, are on the same side of y by more than rounding errors.
 
-    The tangent alone is not reliable where the equations are singular.
+    Where the equations are singular, the tangent alone is not reliable.
     """
     rows = np.clip([[i, i - 1], [i + 1, i + 2]], 0, len(walk.y) - 1)
-    back, ahead = walk.y[rows, k] - y[k]
-    return bool(np.any((back * ahead > 0) & (np.minimum(abs(back), abs(ahead)) > _ROUNDING * (1 + abs(y[k])))))
+    offset_before, offset_after = walk.y[rows, k] - y[k]
+    return bool(
+        np.any(
+            (offset_before * offset_after > 0)
+            & (np.minimum(abs(offset_before), abs(offset_after)) > _ROUNDING * (1 + abs(y[k])))
+        )
+    )

@@ -1,7 +1,7 @@
-"""The curves a0 = 0 in a plane, where a root goes through infinity, and the other roots along them.
+"""Finds the curves a0 = 0 in a plane, where a root goes through infinity, and the other roots along these curves.
 
-On one side of such a curve a large root is negative, on the other positive. The curve bounds stability where the other
-roots are stable, and heavy damping where they are real and negative.
+On one side of such a curve a large root is negative, on the other side it is positive. The curve bounds stability where
+the other roots are stable. It bounds heavy damping where they are real and negative.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,8 +27,8 @@ from tmsopt.tracing.points import axis_functions
 from tmsopt.tracing.seeds import find_unexplained, walk_new_curves
 from tmsopt.tracing.solving import map_rows, project_rows
 
-_NOTHING = 1e-12  # of the largest coefficient: a constant term below it all along the curve vanishes with a0
-_MOST = 10**6
+_ZERO_TERM = 1e-12  # share of the largest coefficient; a constant term below it along the whole curve vanishes with a0
+_MAX_POINTS = 10**6
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class InfinityCurve:
     Attributes:
         parameters: free parameter → values at n points.
         stable: for each of the n - 1 segments, whether it bounds stability.
-        heavily_damped: whether it bounds heavy damping.
-        parting: whether it separates capsize from weave.
-        changes: row → the change of the other roots there: ``capsize``, ``weave``, ``EP2`` or a second ``infinity``.
+        heavily_damped: whether the segment bounds heavy damping.
+        parting: whether the segment separates capsize from weave.
+        changes: row → the change of the other roots at this row: ``capsize``, ``weave``, ``EP2`` or ``infinity``.
     """
 
     parameters: dict[str, Array]
@@ -52,22 +52,24 @@ class InfinityCurve:
 
 def find_infinity_curves(problem: Posed, step: float, starts: int, seed: int) -> Iterator[InfinityCurve]:
     """Every curve a0 = 0 found in the box of a problem with two free parameters."""
-    x, of = ca.SX.sym("x", 2), problem.parameter_set
-    design = {n: ca.atan(v) if of[n].tangent else v for n, v in zip(problem.free, ca.vertsplit(x), strict=True)}
-    a = scale_of(problem).scale_coefficients(Values(problem.model, of, problem.ordered(design)).coefficients)
+    x, parameter_set = ca.SX.sym("x", 2), problem.parameter_set
+    design = {
+        n: ca.atan(v) if parameter_set[n].tangent else v for n, v in zip(problem.free, ca.vertsplit(x), strict=True)
+    }
+    a = scale_of(problem).scale_coefficients(Values(problem.model, parameter_set, problem.ordered(design)).coefficients)
     if ca.SX(a[0]).is_constant() or not ca.depends_on(a[0], x):
         return
     lower, upper = limits_of(problem)
     curve = compile_curve(x, ca.SX(a[0]), upper - lower, lower, upper)
-    along = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
-    rest = ca.Function("rest", [x], [ca.densify(ca.vertcat(*a[1:], along))])
+    alignment = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
+    other_coefficients = ca.Function("rest", [x], [ca.densify(ca.vertcat(*a[1:], alignment))])
     walks: list[Walk] = []
-    walk_new_curves(curve, _find_points(problem, curve, starts, seed, walks), (step, _MOST), walks)
-    yield from (_describe_curve(problem, curve, walk, rest) for walk in walks)
+    walk_new_curves(curve, _find_points(problem, curve, starts, seed, walks), (step, _MAX_POINTS), walks)
+    yield from (_describe_curve(problem, curve, walk, other_coefficients) for walk in walks)
 
 
 def _find_points(problem: Posed, curve: Curve, starts: int, seed: int, walks: Sequence[Walk]) -> Iterator[Array]:
-    """Points of the curve in the box: from designs spread over it, then from a grid where no curve is known."""
+    """Points of the curve in the box: first from designs all over the box, then from a grid, away from known curves."""
     spots = list(islice(sample_box(problem, seed), starts))
     unexplained = ([d] for d in find_unexplained(problem, curve, lambda a: a[0], walks))
     for designs in chain([spots] if spots else [], unexplained):
@@ -76,30 +78,30 @@ def _find_points(problem: Posed, curve: Curve, starts: int, seed: int, walks: Se
         yield y[np.all((curve.lower <= y) & (y <= curve.upper), axis=1)]  # never for nan
 
 
-def _describe_curve(problem: Posed, curve: Curve, walk: Walk, rest: ca.Function) -> InfinityCurve:
+def _describe_curve(problem: Posed, curve: Curve, walk: Walk, other_coefficients: ca.Function) -> InfinityCurve:
     """The curve with every change among its points."""
 
     def values(y: Array) -> Array:
-        return map_rows(rest, y * curve.scale)[0]
+        return map_rows(other_coefficients, y * curve.scale)[0]
 
     def tests(y: Array) -> list[tuple[str, Array]]:
-        """Functions whose zeros are changes of the other roots, each with the name of the change."""
+        """Functions that are 0 where the other roots change, each with the name of the change."""
         v = values(y)
         c = list(v[:, : -2 if constant_vanishes else -1].T)
-        tested = [("weave" if k else "capsize", value) for k, value in enumerate(axis_functions(c))]
-        tested += [("EP2", double_root_test(c))] if len(c) > 2 else []
-        return [("infinity", c[0]), *tested, *([("capsize", v[:, -1])] if constant_vanishes else [])]
+        named_functions = [("weave" if k else "capsize", value) for k, value in enumerate(axis_functions(c))]
+        named_functions += [("EP2", double_root_test(c))] if len(c) > 2 else []
+        return [("infinity", c[0]), *named_functions, *([("capsize", v[:, -1])] if constant_vanishes else [])]
 
     size = np.abs(values(walk.y)[:, :-1])
-    constant_vanishes = bool(np.all(size[:, -1] <= _NOTHING * size.max(axis=1)))
+    constant_vanishes = bool(np.all(size[:, -1] <= _ZERO_TERM * size.max(axis=1)))
     located: list[LocatedEvent] = []
     for k, (name, column) in enumerate(tests(walk.y)):
         event = Event(name, partial(lambda k, tested: tested[k][1], k))
         located += locate_zeros(curve, walk, lambda y, t: tests(y), event, column)
-    located.sort(key=lambda f: (f.after, f.s, f.event.name))
+    located.sort(key=lambda f: (f.row, f.s, f.event.name))
     rows, walk = insert_events(walk, located)
-    distinct = np.append(True, np.any(np.diff(walk.y, axis=0) != 0, axis=1))  # a zero may coincide with a point
-    points, numbers = walk.y[distinct], (np.cumsum(distinct) - 1)[rows].tolist()
+    is_distinct = np.append(True, np.any(np.diff(walk.y, axis=0) != 0, axis=1))  # a zero may be at a point of the walk
+    points, numbers = walk.y[is_distinct], (np.cumsum(is_distinct) - 1)[rows].tolist()
     bounds = _classify_segments(values((points[1:] + points[:-1]) / 2), constant_vanishes)
     row_events = zip(numbers, [f.event.name for f in located], strict=True)
     changes = {row: name for row, name in row_events if any(b[row - 1] != b[row] for b in bounds)}
@@ -109,16 +111,16 @@ def _describe_curve(problem: Posed, curve: Curve, walk: Walk, rest: ca.Function)
 def _classify_segments(v: Array, constant_vanishes: bool) -> tuple[Truth, Truth, Truth]:
     """Whether each segment bounds stability, bounds heavy damping, or separates capsize from weave.
 
-    If the constant term vanishes with a0, another root goes through 0; it goes to the same side only if both
-    coefficients change sign alike.
+    If the constant term vanishes with a0, another root goes through 0. Both roots go to the same side only if both
+    coefficients change their signs in the same direction.
     """
     c = v[:, : -2 if constant_vanishes else -1]
     stable, damped, parting = np.zeros((3, len(c)), dtype=bool)
-    proper = c[:, 0] != 0
+    is_proper = c[:, 0] != 0
     if constant_vanishes:
-        proper &= v[:, -1] > 0
-    stable[proper] = is_stable(c[proper])
-    negative, positive = real_roots(c[proper])
-    damped[proper] = stable[proper] & (negative == c.shape[1] - 1)
-    parting[proper] = ~stable[proper] & (positive == 0)
+        is_proper &= v[:, -1] > 0
+    stable[is_proper] = is_stable(c[is_proper])
+    negative, positive = real_roots(c[is_proper])
+    damped[is_proper] = stable[is_proper] & (negative == c.shape[1] - 1)
+    parting[is_proper] = ~stable[is_proper] & (positive == 0)
     return stable, damped, parting

@@ -15,10 +15,12 @@ from tmsopt.roots.sign_tests import CLOSED, opposite_roots_test
 from tmsopt.tracing.branch import name_unknowns
 from tmsopt.tracing.equations import TracedProblem, design_at
 
-NOTHING = 1e-9  # a function below it all along the curve counts as 0 there
+NOTHING = 1e-9  # a function below this value along the whole curve counts as 0
 
-_ROUNDED = 1e-14  # a few roundings
-_REAL = 1e-6  # imaginary part of a real root, of |s|: rounding of 1e-15 moves double roots by its square root
+_ROUNDING = 1e-14  # relative; a few rounding errors
+_REAL_TOLERANCE = (
+    1e-6  # imaginary part of a real root, relative to |s|: rounding of 1e-15 moves double roots by its square root
+)
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class Points:
     @cached_property
     def x(self) -> Array:
         """The points in natural units."""
-        return np.asarray(self.y * self.traced.curve.scale)
+        return self.y * self.traced.curve.scale
 
     @property
     def unknowns(self) -> list[Array]:
@@ -56,7 +58,7 @@ class Points:
 
     @cached_property
     def values(self) -> Values:
-        """Quantities; those of the roots come from the factors, in which multiple roots are exact."""
+        """Quantities of the points. Those of the roots come from the factors, in which multiple roots are exact."""
         z = roots_along(self.traced.pattern.factors(self.unknowns), len(self))
         problem = self.traced.problem
         return Values(problem.model, problem.parameter_set, self.parameters, extra=(NO_RADIUS,)).with_known(
@@ -84,21 +86,21 @@ class Points:
 
     @cached_property
     def stable(self) -> Truth:
-        """Where all other roots, if any, are left of the imaginary axis by more than rounding."""
-        return np.asarray(np.all(self._others.real < -_ROUNDED * np.abs(self._others), axis=-1))
+        """Where all other roots are left of the imaginary axis by more than rounding errors."""
+        return np.asarray(np.all(self._others.real < -_ROUNDING * np.abs(self._others), axis=-1))
 
     @property
     def heavily_damped(self) -> Truth:
-        """Where all roots are real and the other ones negative."""
-        real = np.all(np.abs(self._others.imag) <= _REAL * np.abs(self._others), axis=-1)
+        """Where all roots are real, and those that the pattern leaves free are negative."""
+        real = np.all(np.abs(self._others.imag) <= _REAL_TOLERANCE * np.abs(self._others), axis=-1)
         return np.asarray(self.stable & real & ("W" not in self.traced.pattern.unknowns))
 
     @property
     def satisfied(self) -> Truth:
         """Where every inequality constraint holds."""
         limits = [c for c in self.traced.problem.conditions.values() if not c.equality]
-        held = [self.column(True), *(c.holds(self.column(c(self.values))) for c in limits)]
-        return np.asarray(np.all(held, axis=0))
+        conditions_hold = [self.column(True), *(c.holds(self.column(c(self.values))) for c in limits)]
+        return np.asarray(np.all(conditions_hold, axis=0))
 
     @property
     def residual(self) -> Array:
@@ -106,11 +108,13 @@ class Points:
         monic = self.traced.pattern.monic(self.unknowns)
         a0 = self.column(self.values.coefficients[0])
         unit = self.column(mean_size(monic))
-        unit = np.maximum(unit, np.median(unit)) + 1e-300  # near roots 0, the unit of the whole curve
+        unit = np.maximum(unit, np.median(unit)) + 1e-300  # near roots 0, use the unit of the whole curve
         pairs = enumerate(zip(self.values.coefficients, monic, strict=True))
         terms = [(a - a0 * c, np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k) for k, (a, c) in pairs]
         # a size is 0 if all roots are 0
-        return np.asarray(np.max([np.abs(off) / np.where(size == 0, 1.0, size) for off, size in terms], axis=0))
+        return np.asarray(
+            np.max([np.abs(mismatch) / np.where(size == 0, 1.0, size) for mismatch, size in terms], axis=0)
+        )
 
     @property
     def special(self) -> list[str]:
@@ -133,9 +137,9 @@ class Points:
 
 
 def _clip_rounding(v: Array, low: float, high: float) -> Array:
-    """Values with rounding errors beyond a limit clipped to the limit."""
+    """The values, where those that exceed a limit only by rounding errors are set to the limit."""
     limited = np.clip(v, low, high)
-    return np.where(np.abs(v - limited) <= _ROUNDED * (1 + np.abs(v)), limited, v)
+    return np.where(np.abs(v - limited) <= _ROUNDING * (1 + np.abs(v)), limited, v)
 
 
 def roots_along(factors: list[list[Any]], count: int) -> Complex:
@@ -151,9 +155,9 @@ def roots_along(factors: list[list[Any]], count: int) -> Complex:
 
 def is_on_axis(z: Complex) -> Truth:
     """Whether roots are on the imaginary axis, up to rounding."""
-    return np.asarray(np.abs(z.real) <= _ROUNDED * np.abs(z))
+    return np.abs(z.real) <= _ROUNDING * np.abs(z)
 
 
 def axis_functions(factor: list[Any]) -> list[Any]:
-    """Functions of which one vanishes when a root of the factor reaches the imaginary axis; the first for a root 0."""
+    """Functions of a factor. One of them vanishes if a root is on the imaginary axis, the first one if a root is 0."""
     return lienard_chipart(factor) if len(factor) - 1 <= CLOSED else [factor[-1], opposite_roots_test(factor)]

@@ -1,4 +1,4 @@
-"""Points on the curves of a pattern: from many designs, from a grid over two parameters, and from beyond infinity."""
+"""Finds points on the curves of a pattern: from many designs, from a grid, and where curves return from infinity."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, cycle, islice
@@ -14,28 +14,29 @@ from tmsopt.tracing.continuation import INFINITE, Curve, Walk, is_on_walk, walk_
 from tmsopt.tracing.equations import TracedProblem, compute_coefficients, design_at
 from tmsopt.tracing.solving import project_rows
 
-_BACK = 300.0  # size of an unknown at which extrapolation through infinity begins
-_FAR = 1e5  # largest unknown of a seed, in units of its scale: above it a0 nearly vanishes
-_ROUNDS = 8  # the search uses at most this many times `starts` designs
-_GUESSES = 4  # starting values of the unknowns tried at each design
+_EXTRAPOLATION_SIZE = 300.0  # size of an unknown at which extrapolation through infinity begins
+_MAX_UNKNOWN = 1e5  # largest unknown of a seed, in units of its scale; above this size a0 nearly vanishes
+_MAX_ROUNDS = 8  # the search uses at most this many times `starts` designs
+_MAX_GUESSES = 4  # starting values of the unknowns tried at each design
 
 POINTS = 256
 """Grid points along each axis; an edge of the grid is about as long as a step of a trace."""
 
 FEWER = 96
-"""The same for degrees without closed forms, where tests compute roots: 9,216 polynomials take one or two seconds."""
+"""Grid points along each axis if the degree has no closed forms. Then 9,216 polynomials take one or two seconds."""
 
-_PATIENCE = 32  # designs in a row that lead to nothing new
-_BLOCK = 256  # points per block of distances
+_MAX_FRUITLESS = 32  # designs in a row without a new curve, after which the search ends
+_BLOCK_SIZE = 256  # points per block of distances
 
 
 def find_unexplained(
     problem: Posed, curve: Curve, test: Callable[[Sequence[Any]], Any], walks: Sequence[Walk]
 ) -> Iterator[dict[str, float]]:
-    """Designs near sign changes of a function of the coefficients that no walk explains; `walks` may grow meanwhile.
+    """Designs near sign changes of a function of the coefficients that are not near any walk.
 
-    They are midpoints of edges of a grid over the box; nan values do not count. Edges on which a0 changes sign too come
-    last, and only while they lead to new curves, since a0 alone explains most of them.
+    The designs are midpoints of edges of a grid over the box. Values that are nan do not count. `walks` may grow during
+    the search. Edges on which a0 also changes sign come last, and only as long as they lead to new curves, because a0
+    causes most of these sign changes.
     """
     low, high = np.array(list(problem.free.values())).T
     points = POINTS if problem.model.degree <= CLOSED else FEWER
@@ -50,113 +51,129 @@ def find_unexplained(
         for axis in (0, 1):
             turns, through = (np.nan_to_num(np.diff(np.sign(v), axis=axis)) != 0 for v in (value, a[..., 0]))
             middles.append(np.argwhere(turns & (through == last)) + np.eye(2)[axis] / 2)
-        left = np.concatenate(middles) / (points - 1)
-        np.random.default_rng(0).shuffle(left)  # neighbours mostly belong to one branch
-        fruitless = seen = 0
-        while len(left) and (fruitless < _PATIENCE or not last):
-            fruitless = fruitless + 1 if seen == len(walks) else 0
-            for walk in walks[seen:]:
+        middles_left = np.concatenate(middles) / (points - 1)
+        np.random.default_rng(0).shuffle(middles_left)  # neighbours mostly belong to one branch
+        fruitless = walks_done = 0
+        while len(middles_left) and (fruitless < _MAX_FRUITLESS or not last):
+            fruitless = fruitless + 1 if walks_done == len(walks) else 0
+            for walk in walks[walks_done:]:
                 line = np.stack([*design_at(problem, walk.y * curve.scale).values()], axis=-1)
-                left = left[is_far_from_line(left, (line - low) / (high - low), 1 / (points - 1))]
-            seen = len(walks)
-            if len(left):
-                yield dict(zip(problem.free, (low + left[0] * (high - low)).tolist(), strict=True))
-                left = left[1:]
+                middles_left = middles_left[
+                    is_far_from_line(middles_left, (line - low) / (high - low), 1 / (points - 1))
+                ]
+            walks_done = len(walks)
+            if len(middles_left):
+                yield dict(zip(problem.free, (low + middles_left[0] * (high - low)).tolist(), strict=True))
+                middles_left = middles_left[1:]
 
 
 def is_far_from_line(points: Array, line: Array, distance: float) -> Truth:
-    """Which of the points, shape (n, 2), are further than a distance from a polyline of shape (m, 2)."""
-    start, along, far = line[:-1] @ (1, 1j), np.diff(line, axis=0) @ (1, 1j) + 1e-300, []  # in the complex plane
-    for block in np.array_split(points @ (1, 1j), len(points) // _BLOCK + 1):
+    """Which of the points, shape (n, 2), are farther than a distance from a polyline of shape (m, 2)."""
+    start, edges, is_far = line[:-1] @ (1, 1j), np.diff(line, axis=0) @ (1, 1j) + 1e-300, []  # in the complex plane
+    for block in np.array_split(points @ (1, 1j), len(points) // _BLOCK_SIZE + 1):
         offset = block[:, None] - start
-        share = np.clip((offset / along).real, 0, 1)
-        far.append(np.abs(offset - share * along).min(axis=1) > distance)
-    return np.concatenate(far)
+        share = np.clip((offset / edges).real, 0, 1)
+        is_far.append(np.abs(offset - share * edges).min(axis=1) > distance)
+    return np.concatenate(is_far)
 
 
 def walk_new_curves(
     curve: Curve, points: Iterable[Iterable[Array]], step_and_most: tuple[float, int], walks: list[Walk]
 ) -> None:
-    """Walk the curves through those points, shape (points, n + 1) each, that are on none of the `walks` yet."""
+    """Walk the curves through the points, shape (points, n + 1) each, that are not yet on one of the `walks`."""
     for y in chain.from_iterable(points):
         if (
-            not any(is_on_walk(curve, known, y) for known in walks)
-            and (found := walk_both_ways(curve, y, *step_and_most)) is not None
+            not any(is_on_walk(curve, walk, y) for walk in walks)
+            and (new_walk := walk_both_ways(curve, y, *step_and_most)) is not None
         ):
-            walks.append(found)
+            walks.append(new_walk)
 
 
 def find_seeds(
     traced: TracedProblem, starts: int, seed: int, through: Sequence[Mapping[str, float]], walks: Sequence[Walk]
 ) -> Iterator[tuple[int, list[Array]]]:
-    """Points of the pattern's curves in the box, from each of many designs, with the count of designs so far.
+    """The number of designs used so far, and the points of the pattern's curves that the last design leads to.
 
-    Without a grid test, the search goes on until `starts` designs in a row find nothing new; `walks` grows meanwhile.
+    Without a grid test, the search continues until `starts` designs in a row find no new curve. `walks` grows during
+    the search.
     """
     problem = traced.problem
     free = len(problem.free)
-    given = [*through, *([problem.start] if set(problem.start) == set(problem.free) else [])]
-    yield from ((0, found) for found in _project_designs(traced, given, [None] * len(given), _GUESSES))
-    fruitless, known, count = 0, len(walks), 0
-    ways = cycle([None, *range(free)])
+    first_designs = [*through, *([problem.start] if set(problem.start) == set(problem.free) else [])]
+    yield from (
+        (0, points) for points in _project_designs(traced, first_designs, [None] * len(first_designs), _MAX_GUESSES)
+    )
+    fruitless, walk_count, count = 0, len(walks), 0
+    held_variables = cycle([None, *range(free)])
     designs = sample_box(problem, seed)
-    while count < (starts if _has_grid_test(traced) else _ROUNDS * starts):
-        for found in _project_designs(traced, list(islice(designs, starts)), list(islice(ways, starts)), _GUESSES):
+    while count < (starts if _choose_grid_test(traced) else _MAX_ROUNDS * starts):
+        for points in _project_designs(
+            traced, list(islice(designs, starts)), list(islice(held_variables, starts)), _MAX_GUESSES
+        ):
             if fruitless >= starts:
                 return
             count += 1
-            yield count, found
-            fruitless, known = (fruitless + 1 if len(walks) == known else 0), len(walks)
+            yield count, points
+            fruitless, walk_count = (fruitless + 1 if len(walks) == walk_count else 0), len(walks)
 
 
-def _has_grid_test(traced: TracedProblem) -> bool:
-    """Whether a grid over two free parameters shows every branch that is not too short for it."""
-    return traced.pattern.test is not None and len(traced.problem.free) == 2
+def _choose_grid_test(traced: TracedProblem) -> Callable[[Sequence[Any]], Any] | None:
+    """The function whose sign changes on a grid show every branch that is not too short; None without one."""
+    return traced.pattern.test if len(traced.problem.free) == 2 else None
 
 
 def find_missed(traced: TracedProblem, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
-    """Points of the curves where a test function of the pattern changes sign on a grid, off the walks so far."""
-    if traced.pattern.test is not None and _has_grid_test(traced):
-        for design in find_unexplained(traced.problem, traced.curve, traced.pattern.test, walks):
-            yield 0, _project_designs(traced, [design])[0]
+    """Points of curves that are not walked yet: near sign changes on a grid, and where curves return from infinity."""
+    test = _choose_grid_test(traced)
+    missed = find_unexplained(traced.problem, traced.curve, test, walks) if test else ()
+    for design in chain(missed, _list_designs_beyond_infinity(traced, walks)):
+        yield 0, _project_designs(traced, [design])[0]
 
 
-def find_beyond_infinity(traced: TracedProblem, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
-    """Points where a curve may return from infinity: a root changes sides there, and the parameters continue.
+def _list_designs_beyond_infinity(traced: TracedProblem, walks: Sequence[Walk]) -> Iterator[dict[str, Any]]:
+    """Designs near which a curve may return from infinity, where a root goes from −∞ to +∞ or back.
 
-    The parameters approach a0 = 0 with the inverse of the unknown that grows, so two points give the limit and a point
-    beyond it.
+    The distance of the parameters from a0 = 0 is proportional to the inverse of the unknown that grows. So two points
+    give the limit and a point on its other side.
     """
     free = len(traced.problem.free)
-    for walk in walks:  # `walks` grows meanwhile
+    for walk in walks:  # `walks` grows during the loop
         for end, y in zip(walk.ends, (walk.y[::-1], walk.y), strict=True):
             if end.reason != INFINITE:
                 continue
             size = np.abs(y[:, free:]).max(axis=1)
-            begin = np.max(np.flatnonzero(size < _BACK), initial=0)
-            if begin < len(y) - 2:
-                (here, far), weight = (y[begin, :free], y[-1, :free]), size[begin] / size[-1]
-                limit = (far - weight * here) / (1 - weight)
-                x = (2 * limit - here) * traced.curve.scale[:free]
-                yield 0, _project_designs(traced, [design_at(traced.problem, x)])[0]
+            row = np.max(np.flatnonzero(size < _EXTRAPOLATION_SIZE), initial=0)
+            if row < len(y) - 2:
+                (near_point, far_point), weight = (y[row, :free], y[-1, :free]), size[row] / size[-1]
+                limit = (far_point - weight * near_point) / (1 - weight)
+                x = (2 * limit - near_point) * traced.curve.scale[:free]
+                yield design_at(traced.problem, x)
 
 
 def _project_designs(
-    traced: TracedProblem, designs: Sequence[Mapping[str, float]], held: Sequence[int | None] = (None,), most: int = 1
+    traced: TracedProblem,
+    designs: Sequence[Mapping[str, float]],
+    held_variables: Sequence[int | None] = (None,),
+    max_guesses: int = 1,
 ) -> list[list[Array]]:
-    """Points of the curves in the box near each design, from the best guesses, with one variable held."""
+    """Points of the curves in the box near each design, from the best guesses, with one variable held constant."""
     curve, free = traced.curve, len(traced.problem.free)
-    tried = [
-        (k, y) for k, design in enumerate(designs) for y in traced.list_starts(design, best_first=most == 1)[:most]
+    starts = [
+        (k, y)
+        for k, design in enumerate(designs)
+        for y in traced.list_starts(design, best_first=max_guesses == 1)[:max_guesses]
     ]
-    if not tried:
+    if not starts:
         return [[] for _ in designs]
-    owner = [k for k, _ in tried]
-    y = project_rows(curve.evaluate, np.array([y for _, y in tried]), [held[k] for k in owner])
-    inside = np.all((y >= curve.lower - 1e-12) & (y <= curve.upper + 1e-12), axis=1)  # never for nan
-    inside &= np.abs(y[:, free:]).max(axis=1) <= _FAR
+    owner = [k for k, _ in starts]
+    y = project_rows(curve.evaluate, np.array([y for _, y in starts]), [held_variables[k] for k in owner])
+    is_inside = np.all((y >= curve.lower - 1e-12) & (y <= curve.upper + 1e-12), axis=1)  # never for nan
+    is_inside &= np.abs(y[:, free:]).max(axis=1) <= _MAX_UNKNOWN
     y = np.clip(y, curve.lower, curve.upper)
-    inside[inside] = traced.has_leading_coefficient(
-        compute_coefficients(traced.problem, design_at(traced.problem, y[inside] * curve.scale))
+    is_inside[is_inside] = traced.has_leading_coefficient(
+        compute_coefficients(traced.problem, design_at(traced.problem, y[is_inside] * curve.scale))
     )
-    return [[y[i] for i, of in enumerate(owner) if of == k and inside[i]] for k in range(len(designs))]
+    return [
+        [y[i] for i, design_index in enumerate(owner) if design_index == k and is_inside[i]]
+        for k in range(len(designs))
+    ]

@@ -1,4 +1,4 @@
-"""Zeros of equations and functions, for many starts at once; each row of an array is independent."""
+"""Finds zeros of equations and functions from many starts at once. The rows of an array are independent."""
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
@@ -10,78 +10,80 @@ from numpy.typing import NDArray
 
 from tmsopt.records import Array
 
-_SOLVED = 1e-10  # largest relative residual of a solution; excludes stationary points of the residual
-_DAMPING = 0.5 ** np.arange(10)  # shares of a Gauss–Newton step; the first that reduces the residual is taken
-_STEPS = 40  # of Gauss–Newton at most
-_FINE = 1e-17  # absolute accuracy, of the interval, for a zero near 0
-_AT_END = 1e-6  # an end is a zero if its value is below this share of the value at the other end
+_MAX_RESIDUAL = 1e-10  # largest relative residual of a solution; it excludes stationary points of the residual
+_STEP_SHARES = 0.5 ** np.arange(10)  # shares of a Gauss–Newton step; the first share that reduces the residual is used
+_MAX_STEPS = 40  # most Gauss–Newton steps
+_ZERO_ACCURACY = 1e-17  # accuracy of a zero near 0, relative to the interval
+_END_RATIO = 1e-6  # an end is a zero if its value is below this share of the value at the opposite end
 _EPS = 4 * np.finfo(float).eps
-_HALVINGS = 100  # steps towards a zero at most
+_MAX_HALVINGS = 100  # most steps towards a zero
 
 
 @np.errstate(over="ignore")
-def project_rows(system: ca.Function, y: Array, held: Sequence[int | None]) -> Array:
-    """Solutions near the rows of y by damped Gauss–Newton, with one variable per row held or none; nan if none exists.
+def project_rows(system: ca.Function, y: Array, held_variables: Sequence[int | None]) -> Array:
+    """Solutions near the rows of y by the damped Gauss–Newton method; nan where it finds none.
 
-    `system` gives the equations, any number of them, and their Jacobian.
+    Args:
+        system: y → any number of equations and their Jacobian.
+        held_variables: for each row, the index of a variable that is held constant, or None.
     """
-    y, found = y.copy(), np.full(y.shape, np.nan)
-    is_free = np.array([[k != h for k in range(y.shape[1])] for h in held], dtype=float)
+    y, solutions = y.copy(), np.full(y.shape, np.nan)
+    is_free = np.array([[k != h for k in range(y.shape[1])] for h in held_variables], dtype=float)
     rows: NDArray[np.intp] = np.arange(len(y))
-    for _ in range(_STEPS):
+    for _ in range(_MAX_STEPS):
         value, jacobian = evaluate_rows(system, y[rows])
-        proper = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(jacobian), axis=(1, 2))
-        rows, value, jacobian = rows[proper], value[proper], jacobian[proper]
+        is_finite = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(jacobian), axis=(1, 2))
+        rows, value, jacobian = rows[is_finite], value[is_finite], jacobian[is_finite]
         if not rows.size:
             break
-        here, size = y[rows], np.abs(value).max(axis=1)
-        size_of_point = 1 + np.abs(here).max(axis=1)
+        points, size = y[rows], np.abs(value).max(axis=1)
+        size_of_point = 1 + np.abs(points).max(axis=1)
         step = -np.linalg.pinv(jacobian * is_free[rows, None], rcond=1e-12) @ value[..., None]
         step = step[..., 0] * is_free[rows]
         has_stopped = np.abs(step).max(axis=1) <= 1e-13 * size_of_point
-        is_solved = has_stopped & (size <= _SOLVED * np.abs(jacobian).max(axis=(1, 2)) * size_of_point)
-        found[rows[is_solved]] = (here + step)[is_solved]
-        left = np.flatnonzero(~has_stopped)
-        for share in _DAMPING:
-            if left.size:
-                trial = here[left] + share * step[left]
+        is_solved = has_stopped & (size <= _MAX_RESIDUAL * np.abs(jacobian).max(axis=(1, 2)) * size_of_point)
+        solutions[rows[is_solved]] = (points + step)[is_solved]
+        undecided = np.flatnonzero(~has_stopped)
+        for share in _STEP_SHARES:
+            if undecided.size:
+                trial = points[undecided] + share * step[undecided]
                 value = evaluate_rows(system, trial)[0]
-                lower = np.all(np.isfinite(trial), axis=1) & (np.abs(value).max(axis=1) < size[left])
-                y[rows[left[lower]]] = trial[lower]
-                left = left[~lower]
-        converged = left[size[left] <= 1e-13]
-        found[rows[converged]] = here[converged]
-        rows = np.delete(rows, [*np.flatnonzero(has_stopped), *left])
-    return found
+                lower = np.all(np.isfinite(trial), axis=1) & (np.abs(value).max(axis=1) < size[undecided])
+                y[rows[undecided[lower]]] = trial[lower]
+                undecided = undecided[~lower]
+        converged = undecided[size[undecided] <= 1e-13]
+        solutions[rows[converged]] = points[converged]
+        rows = np.delete(rows, [*np.flatnonzero(has_stopped), *undecided])
+    return solutions
 
 
 def find_zeros(function: Callable[[Array], Array], ends: Array) -> Array:
     """Zeros in many intervals [0, end] at once, by Chandrupatla's method; nan without a change of sign."""
     a, b = ends.astype(float), np.zeros(len(ends))
     fa, fb = function(a), function(b)
-    found = np.where(np.abs(fa) < np.abs(fb), a, b)
-    small, large = np.sort(np.abs([fa, fb]), axis=0)
-    found = np.where(small <= _AT_END * large, found, np.nan)  # rounding may hide a zero at an end
+    zeros = np.where(np.abs(fa) < np.abs(fb), a, b)
+    smaller_end, larger_end = np.sort(np.abs([fa, fb]), axis=0)
+    zeros = np.where(smaller_end <= _END_RATIO * larger_end, zeros, np.nan)  # rounding may hide a zero at an end
     active = np.sign(fa) * np.sign(fb) < 0
     share = np.full(len(ends), 0.5)
-    for _ in range(_HALVINGS):
+    for _ in range(_MAX_HALVINGS):
         if not np.any(active):
             break
         x = a + share * (b - a)
         fx = function(x)
-        kept = np.sign(fx) == np.sign(fa)  # a is the newest point, c the one before it
-        c, fc = np.where(kept, a, b), np.where(kept, fa, fb)
-        b, fb = np.where(kept, b, a), np.where(kept, fb, fa)
+        same_sign = np.sign(fx) == np.sign(fa)  # a is the newest point, c the point before it
+        c, fc = np.where(same_sign, a, b), np.where(same_sign, fa, fb)
+        b, fb = np.where(same_sign, b, a), np.where(same_sign, fb, fa)
         a, fa = x, fx
-        found = np.where(active, np.where(np.abs(fa) < np.abs(fb), a, b), found)
+        zeros = np.where(active, np.where(np.abs(fa) < np.abs(fb), a, b), zeros)
         with np.errstate(all="ignore"):
-            limit = (_FINE * np.abs(ends) + _EPS * np.abs(found)) / (2 * np.abs(b - a))
+            limit = (_ZERO_ACCURACY * np.abs(ends) + _EPS * np.abs(zeros)) / (2 * np.abs(b - a))
             xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
             inverse = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
             share = np.where((phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi), inverse, 0.5)
         active &= (limit <= 0.5) & (fa != 0) & (fb != 0) & np.isfinite(share)
         share = np.where(active, np.clip(share, limit, 1 - limit), 0.0)
-    return found
+    return zeros
 
 
 def evaluate_rows(system: ca.Function, y: Array) -> tuple[Array, Array]:
@@ -91,7 +93,7 @@ def evaluate_rows(system: ca.Function, y: Array) -> tuple[Array, Array]:
 
 
 def map_rows(function: ca.Function, *arguments: Array) -> list[Array]:
-    """A function of dense columns at every row of its arguments."""
+    """Evaluate a function of dense columns at every row of its arguments."""
     room = 1 << max(len(arguments[0]) - 1, 0).bit_length()  # few sizes, since making a map is costly
     return MappedFunction(function, room)(*arguments)
 

@@ -1,4 +1,4 @@
-"""Follows one curve point by point: an iterator that a user can stop and turn around."""
+"""Follows one curve point by point, by an iterator that a user can stop and reverse."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -27,10 +27,10 @@ def continue_from(
     """Follow one curve of a pattern point by point, from a point near a design.
 
     Args:
-        problem: as for `trace`; the curve of a solution begins at its parameters.
-        pattern: name; by default the one that the problem locates.
-        through: a point to begin near, with a value for every free parameter; by default the parameters of a solution,
-            or the first from which the search of `trace` finds a point.
+        problem: as for `trace`. For a solution, the curve begins at its parameters.
+        pattern: name of the pattern; by default the pattern that the problem locates.
+        through: a design near which the curve begins, with a value for every free parameter. The default is the
+            parameters of a solution, or the first design from which the search of `trace` finds a point.
         step: longest step, in widths of the box.
         events: events to locate in addition to the built-in ones.
 
@@ -58,19 +58,19 @@ def continue_from(
                 return Continuation(traced, CurvePoint(y, compute_tangent(traced.curve, y)), step, checked_events)
             except ValueError:  # not a regular point of a curve
                 continue
-    near = "near the design" if designs else "in the box"
+    place = "near the design" if designs else "in the box"
     raise input_error(
-        f"no point of {problem_with_pattern.locate} found {near}; give another point to begin at", "through"
+        f"no point of {problem_with_pattern.locate} found {place}; give another point to begin at", "through"
     )
 
 
 class Continuation(Iterator[BranchPoint]):
-    """Iterator of the points of one curve, events located among them; `continue_from` makes it.
+    """Iterator over the points of one curve, which include its events; `continue_from` makes it.
 
-    It ends where the curve leaves the box, closes or has no direction, and at an event that stops it.
+    It ends where the curve leaves the box, closes or has no direction, and at an event that stops the curve.
 
     Attributes:
-        end: why there are no more points, in words; empty while there are more.
+        end: why there are no more points, in words; empty as long as there are more points.
 
     Example:
         >>> curve = tmsopt.continue_from("problems/ep_set.toml", step=0.02)
@@ -96,26 +96,25 @@ class Continuation(Iterator[BranchPoint]):
         return next(self._points)
 
     def reverse(self) -> None:
-        """Turn around at the last point; the next one lies behind it."""
+        """Turn around at the last point; the next point lies behind it."""
         self._sign, self.end = -self._sign, ""
         self._points = self._follow(CurvePoint(self._last.y, -self._last.t), fresh=False)
 
     def _follow(self, start: CurvePoint, fresh: bool) -> Iterator[BranchPoint]:
-        """Yield the points after a start, or from it if `fresh`; then set `end`."""
-        behind = [start]
-        for new in follow(self._traced.curve, start, self._step):
-            if isinstance(new, End):
-                self.end = describe_end(self._traced, new) or CLOSED
+        """Yield the points after a start, also the start itself if `fresh`; then set `end`."""
+        previous_points = [start]
+        for point in follow(self._traced.curve, start, self._step):
+            if isinstance(point, End):
+                self.end = describe_end(self._traced, point) or CLOSED
                 return
-            y, t = (np.array([getattr(p, name) for p in (*behind, new)]) for name in "yt")
+            y, t = (np.array([getattr(p, name) for p in (*previous_points, point)]) for name in "yt")
             walk, row_events = find_events(self._traced, Walk(y, t, (End(""), End(""))), self._events)
             branch, arclength = make_branch(self._traced, walk, row_events), self._arclength
-            first = int(np.flatnonzero(np.all(walk.y == behind[-1].y, axis=1))[-1])
+            first = int(np.flatnonzero(np.all(walk.y == previous_points[-1].y, axis=1))[-1])
             for row in range(first + (not fresh), len(walk.y)):
                 events = [event for at, event in row_events if at == row]
-                is_repeated = (
-                    len(behind) == 1 and np.abs(walk.y[row] - start.y).max() <= SAME_PLACE
-                )  # it turned around there
+                # the user turned around at this event
+                is_repeated = len(previous_points) == 1 and np.abs(walk.y[row] - start.y).max() <= SAME_PLACE
                 if (events and not is_repeated) or row == len(walk.y) - 1 or (fresh and row == first):
                     self._last = CurvePoint(walk.y[row], walk.t[row])
                     self._arclength = arclength + self._sign * float(branch.arclength[row] - branch.arclength[first])
@@ -132,4 +131,4 @@ class Continuation(Iterator[BranchPoint]):
                     if stop := [event.name for event in events if event.stop]:
                         self.end = stop[0]
                         return
-            behind, fresh = [behind[-1], new], False
+            previous_points, fresh = [previous_points[-1], point], False

@@ -1,8 +1,9 @@
 """The discriminant surface around an EP4: a swallowtail, parametrised by its double root and cut along its edges.
 
-In two of the parameters, here chi_B and T = tan λ_s, the coefficients are affine. A double root r at a given value of
-the third, Fr, is then two linear equations p(r) = p′(r) = 0, so (Fr, r) parametrises the whole surface. It turns back
-where the root is triple (EP3) and crosses itself where a second pair is double (2EP2). Cut there, patches are smooth.
+The coefficients are affine functions of two parameters, here chi_B and T = tan λ_s. At a given value of the third
+parameter, Fr, a double root r satisfies two linear equations p(r) = p′(r) = 0. So (Fr, r) parametrises the whole
+surface. The surface turns back where the root is triple (EP3), and crosses itself where two other roots form a second
+double root (2EP2). The surface is cut along these edges into smooth patches.
 """
 
 from collections.abc import Iterable
@@ -27,28 +28,28 @@ from tmsopt.tracing.solving import find_zeros
 from tmsopt.tracing.trace import STARTS, trace
 
 Cut = tuple[float, str]
-"""A double root and the kind of edge there: of the surface, or of the box."""
+"""A double root, and the kind of the edge at this root: an edge of the surface or of the box."""
 
 AffineCoefficients = tuple[Array, Array, Array]
 """Coefficients A, B, C of a polynomial A + x B + y C, where x and y are the last two variables."""
 
-_LEAST = 4  # degree
+_MIN_DEGREE = 4  # lowest degree with two double roots
 
-_SCAN = 2000
-_SAME = 1e-12  # widths of the box
+_SCAN_POINTS = 2000  # double roots r at which edges are searched
+_SAME_ROW = 1e-12  # distance, in widths of the box, up to which two rows count as one
 _OFFSETS = np.array([1e-7, 4e-5, 1e-4, 1e-3, 4e-3, 0.012])
-_AROUND = np.concatenate([-_OFFSETS[::-1], _OFFSETS])
-"""Rows on either side of a value of Fr where the number of edges changes."""
+_ROWS_AROUND = np.concatenate([-_OFFSETS[::-1], _OFFSETS])
+"""Distances of additional rows from a value of Fr at which the number of edges changes."""
 
 
 @dataclass(frozen=True)
 class Patch:
-    """A smooth piece of the surface, arrays of shape (rows, columns): a row has one Fr, a column one share of r.
+    """A smooth part of the surface, as arrays of shape (rows, columns). A row has one value of Fr.
 
     Attributes:
         points: name of a free parameter → its values.
         r: the double root.
-        heavily_damped: whether the piece bounds the heavily damped designs.
+        heavily_damped: whether the patch bounds the heavily damped designs.
     """
 
     points: dict[str, Array]
@@ -63,7 +64,7 @@ class Swallowtail(Printable):
     Attributes:
         axes: the three free parameters; rows of patches have one value of the first.
         cusps: traced EP3 curves, the cuspidal edges.
-        crossing: the traced EP set, 2EP2 on the self-intersection of the surface and CEP2 beyond it.
+        crossing: the traced EP set: 2EP2 where the surface intersects itself, and CEP2 on the rest of the curve.
 
     Example:
         >>> surface = tmsopt.swallowtail("problems/ep_set.toml", rows=4, across=4, starts=8)
@@ -108,9 +109,9 @@ def swallowtail(
     More: docs/how_to/tracing.md
     """
     plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
-    if plane.model.degree < _LEAST:
+    if plane.model.degree < _MIN_DEGREE:
         message = (
-            f"model '{plane.model.name}' has degree {plane.model.degree}; accepted: {_LEAST} or more, since a "
+            f"model '{plane.model.name}' has degree {plane.model.degree}; accepted: {_MIN_DEGREE} or more, since a "
             "swallowtail crosses itself at two double roots; trace EP2 and EP3 instead"
         )
         raise input_error(message, "model")
@@ -123,34 +124,36 @@ def swallowtail(
     cusps, crossing = (trace(plane, name, starts=starts, progress=progress) for name in ("EP3", "2EP2"))
     grid = _choose_rows(plane, rows, (*cusps.events, *crossing.events))
     scan = np.union1d(
-        -np.geomspace(1e3, 1e-3, _SCAN), [b.unknowns["r"][e.index] for b in cusps.branches for e in b.events]
+        -np.geomspace(1e3, 1e-3, _SCAN_POINTS), [b.unknowns["r"][e.index] for b in cusps.branches for e in b.events]
     )
     cuts, steps = [], start_steps(progress, "cutting the surface", "row")
-    for done, value in enumerate(grid.tolist(), 1):
+    for row_count, value in enumerate(grid.tolist(), 1):
         cuts.append(_find_cuts(plane, value, scan[scan < 0]))
         if steps:
-            steps(done, len(grid))
+            steps(row_count, len(grid))
     patches = []
     # neighbouring rows with the same cuts form one set of patches
     for _, run in groupby(range(len(grid)), key=lambda k: [[kind for _, kind in interval] for interval in cuts[k]]):
-        inside = list(run)
-        for intervals in zip(*(cuts[k] for k in inside), strict=True) if len(inside) > 1 else ():
+        rows_of_run = list(run)
+        for intervals in zip(*(cuts[k] for k in rows_of_run), strict=True) if len(rows_of_run) > 1 else ():
             table = np.array([[r for r, _ in interval] for interval in intervals])
-            patches += [_make_patch(plane, grid[inside], left, right, across) for left, right in pairwise(table.T)]
+            patches += [
+                _make_patch(plane, grid[rows_of_run], left_edge, right_edge, across)
+                for left_edge, right_edge in pairwise(table.T)
+            ]
     return Swallowtail(plane.problem, (first, pair[0], pair[1]), tuple(patches), cusps, crossing)
 
 
 def _choose_rows(problem: Posed, count: int, events: Iterable[EventPoint]) -> Array:
-    """Values of the first parameter: evenly spaced, with extra ones around each change of the number of edges."""
+    """Values of the first parameter: evenly spaced values, and more around each change of the number of edges."""
     name, (low, high) = next(iter(problem.free.items()))
     changes = [
-        e.parameters[name] + _AROUND for e in events if e.name == "EP4" or (e.name == "fold" and name in e.detail)
+        e.parameters[name] + _ROWS_AROUND for e in events if e.name == "EP4" or (e.name == "fold" and name in e.detail)
     ]
     grid = np.unique(np.concatenate([np.linspace(low, high, count), *changes]))
     grid = grid[(grid >= low) & (grid <= high)]
-    return np.asarray(
-        grid[np.append(True, np.diff(grid) > _SAME * (high - low))]
-    )  # an EP4 is an event of several traces
+    # an EP4 is an event of several traces, so values may repeat
+    return np.asarray(grid[np.append(True, np.diff(grid) > _SAME_ROW * (high - low))])
 
 
 def _compute_polynomials(problem: Posed, x: Any) -> Array:
@@ -159,16 +162,18 @@ def _compute_polynomials(problem: Posed, x: Any) -> Array:
 
 
 def _split_affine(problem: Posed, first: float) -> AffineCoefficients:
-    constant, one, other = _compute_polynomials(problem, [(first, 0.0, 0.0), (first, 1.0, 0.0), (first, 0.0, 1.0)])
-    return constant, one - constant, other - constant
+    constant, at_first_unit, at_second_unit = _compute_polynomials(
+        problem, [(first, 0.0, 0.0), (first, 1.0, 0.0), (first, 0.0, 1.0)]
+    )
+    return constant, at_first_unit - constant, at_second_unit - constant
 
 
 def _is_affine(problem: Posed) -> bool:
     first = float(np.mean(next(iter(problem.free.values()))))
     A, B, C = _split_affine(problem, first)
     predicted = np.array([A + 2 * B + 3 * C, A - B + C / 2])
-    found = _compute_polynomials(problem, [(first, 2.0, 3.0), (first, -1.0, 0.5)])
-    return bool(np.all(np.abs(found - predicted) <= 1e-9 * np.abs(predicted).max(axis=1, keepdims=True)))
+    actual = _compute_polynomials(problem, [(first, 2.0, 3.0), (first, -1.0, 0.5)])
+    return bool(np.all(np.abs(actual - predicted) <= 1e-9 * np.abs(predicted).max(axis=1, keepdims=True)))
 
 
 def _solve_double_root(affine: AffineCoefficients, r: Array) -> tuple[Array, Array]:
@@ -180,24 +185,27 @@ def _solve_double_root(affine: AffineCoefficients, r: Array) -> tuple[Array, Arr
 
 
 def _find_cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
-    """For each interval of r inside the box, ascending: its ends and the edges between them; `scan` holds values of r.
+    """For each interval of r inside the box, in ascending order, its two ends and the edges between them.
 
-    Edges are zeros along r of the slack to the box, of the other roots' polynomial at r (EP3), and of its
-    discriminant (2EP2).
+    Edges are zeros of three functions of r: of the distance to the box, of the polynomial of the other roots at r
+    (EP3), and of the discriminant of this polynomial (2EP2).
+
+    Args:
+        scan: values of r between which the edges are searched.
     """
     affine, (low, high) = _split_affine(problem, first), (limit[1:, None] for limit in limits_of(problem))
 
     def tests(r: Array) -> list[Array]:
         x = np.stack(_solve_double_root(affine, r))
-        least = np.min(np.minimum(x - low, high - x) / (high - low), axis=0)
-        rest = _divide(_divide(affine[0][:, None] + np.tensordot(np.stack(affine[1:]), x, (0, 0)), r), r)
-        return [np.where(np.isfinite(least), least, -1.0), np.polyval(rest, r), double_root_test(list(rest))]
+        slack = np.min(np.minimum(x - low, high - x) / (high - low), axis=0)
+        quotient = _divide(_divide(affine[0][:, None] + np.tensordot(np.stack(affine[1:]), x, (0, 0)), r), r)
+        return [np.where(np.isfinite(slack), slack, -1.0), np.polyval(quotient, r), double_root_test(list(quotient))]
 
     cuts: list[Cut] = []
     values = tests(scan)
     for k, kind in enumerate(("box", "EP3", "2EP2")):
         rows = np.flatnonzero(has_sign_change(values[k]))
-        value = partial(lambda k, here, s: tests(here + s)[k], k, scan[rows])
+        value = partial(lambda k, start, s: tests(start + s)[k], k, scan[rows])
         cuts += [(float(r), kind) for r in scan[rows] + find_zeros(value, np.diff(scan)[rows])]
     ends = [r for r in (scan[0], scan[-1]) if values[0][r == scan][0] > 0]
     cuts = sorted([*cuts, *((float(r), "box") for r in ends)])
@@ -213,9 +221,9 @@ def _divide(p: Array, r: Array) -> Array:
     return np.stack(rows)
 
 
-def _make_patch(problem: Posed, grid: Array, left: Array, right: Array, across: int) -> Patch:
-    share = (1 - np.cos(np.linspace(0, np.pi, across))) / 2  # crowds at the edges, where the surface turns
-    r = left[:, None] + (right - left)[:, None] * share
+def _make_patch(problem: Posed, grid: Array, left_edge: Array, right_edge: Array, across: int) -> Patch:
+    share = (1 - np.cos(np.linspace(0, np.pi, across))) / 2  # dense at the edges, where the surface turns back
+    r = left_edge[:, None] + (right_edge - left_edge)[:, None] * share
     pairs = [
         _solve_double_root(_split_affine(problem, first), row) for first, row in zip(grid.tolist(), r, strict=True)
     ]

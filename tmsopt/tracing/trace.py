@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from tmsopt.tracing.continuation import Walk
 from tmsopt.tracing.description import make_branches
 from tmsopt.tracing.equations import prepare_tracing
 from tmsopt.tracing.events import Event, check_events
-from tmsopt.tracing.seeds import find_beyond_infinity, find_missed, find_seeds, walk_new_curves
+from tmsopt.tracing.seeds import find_missed, find_seeds, walk_new_curves
 
 STARTS = 48
 STEP = 0.005
@@ -49,16 +50,17 @@ def trace(
     events: Sequence[Event] = (),
     progress: Listener | None = None,
 ) -> Trace:
-    """Every branch of a pattern in the box; one more parameter must be free than the pattern has conditions.
+    """Every branch of a pattern in the box. The pattern needs one free parameter more than it has conditions.
 
     Args:
-        pattern: name; by default the one that the problem locates.
+        pattern: name of the pattern; by default the pattern that the problem locates.
         step: longest step, in widths of the box.
         starts: number of designs from which branches are searched. With two free parameters and one condition (EP2,
-            weave, capsize) a grid of 256 × 256 designs, 96 × 96 above degree 4, finds those they missed. Otherwise
-            the search ends when this many in a row find nothing new; a branch far from all of them can be missed.
+            weave, capsize), a grid of 256 × 256 designs (96 × 96 above degree 4) finds the branches that they miss.
+            Otherwise the search ends when this many designs in a row find no new branch, and it can miss a branch that
+            is far from all of them.
         most: largest number of points of a branch in one direction.
-        through: points in the box (values of every free parameter) to begin at, before the others.
+        through: points in the box (values of every free parameter) from which the search begins.
         events: events to locate in addition to the built-in ones.
         progress: function called with a `tmsopt.Progress` now and then.
 
@@ -76,38 +78,38 @@ def trace(
     """
     started = time.perf_counter()
     problem, checked_events = locate_pattern(pose(problem), pattern), check_events(events)
-    counts = ("starts", starts, 0, MOST_STARTS), ("seed", seed, 0, None), ("most", most, _FEWEST, None)
+    counts = ("starts", starts, 0, MOST_STARTS), ("seed", seed, 0, None), ("most", most, _MIN_POINTS, None)
     check_options(problem, step, *counts, through=through, progress=progress)
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
     traced = prepare_tracing(problem)
     walks: list[Walk] = []
-    tried = 0
+    tried_starts = 0
 
     def points() -> Iterator[list[Array]]:
-        nonlocal tried
-        for source in (
-            find_seeds(traced, starts, seed, through, walks),
-            find_missed(traced, walks),
-            find_beyond_infinity(traced, walks),
-        ):
-            for count, found in source:
-                tried = max(tried, count)
-                if steps:
-                    steps(tried, max(tried, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
-                yield found
+        nonlocal tried_starts
+        for count, seeds in chain(find_seeds(traced, starts, seed, through, walks), find_missed(traced, walks)):
+            tried_starts = max(tried_starts, count)
+            if steps:
+                steps(tried_starts, max(tried_starts, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
+            yield seeds
 
     walk_new_curves(traced.curve, points(), (step, most), walks)
     with np.errstate(all="ignore"):  # values near infinity may not be finite
-        branches = [
-            b for w in walks for b in make_branches(traced, w, checked_events) if b.residual <= _FITTING
-        ]  # never for nan
+        # a residual of nan is never small enough
+        branches = [b for w in walks for b in make_branches(traced, w, checked_events) if b.residual <= _MAX_RESIDUAL]
     branches.sort(key=lambda b: -float(b.arclength[-1]))
     seconds = time.perf_counter() - started
-    return Trace(problem.problem, str(problem.locate), tuple(branches), tried, seconds, sum(w.seconds for w in walks))
+    return Trace(
+        problem.problem, str(problem.locate), tuple(branches), tried_starts, seconds, sum(w.seconds for w in walks)
+    )
 
 
 def locate_pattern(problem: Posed, name: str | None) -> Posed:
-    """The problem with the pattern as its only objective, checked to leave one degree of freedom."""
+    """The problem with the pattern as its only objective.
+
+    Raises:
+        InputError: for an unknown pattern, or if the pattern does not leave one degree of freedom.
+    """
     name = name or problem.locate
     names = patterns_of(problem.model)
     if name is None:
@@ -116,21 +118,21 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
     try:
         name = pattern_of(problem.model, str(name)).name
     except ValueError as error:
-        why = "" if str(error).endswith("is no pattern") else f": {error}"
-        message = f"unknown pattern '{name}'{why}; {suggest(str(name), names)}"
+        reason = "" if str(error).endswith("is no pattern") else f": {error}"
+        message = f"unknown pattern '{name}'{reason}; {suggest(str(name), names)}"
         raise input_error(message, "objective", "locate") from error
     question = problem.derive(locate=name, minimize=None, maximize=None)
     count = degrees_of_freedom(question)
     if count.count != 1:
-        free, needed = ", ".join(problem.free) or "none", count.conditions + 1
+        free, needed_count = ", ".join(problem.free) or "none", count.conditions + 1
         advice = (
-            f"free {needed - count.free} more"
+            f"free {needed_count - count.free} more"
             if count.count < 1
             else f"fix {count.count - 1} of them, or add as many == constraints"
         )
         conditions = f"{count.conditions} condition{'s' * (count.conditions != 1)}"
         message = (
-            f"a curve of {name} needs {needed} free parameters ({conditions} and one to move along), "
+            f"a curve of {name} needs {needed_count} free parameters ({conditions} and one to move along), "
             f"found {count.free} ({free}); {advice}"
         )
         raise input_error(message, "parameters")
@@ -138,23 +140,22 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
 
 
 def check_options(
-    problem: Posed,
-    step: Any,
-    *counts: tuple[str, Any, int, int | None],
-    through: Any = (),
-    progress: Any = None,
+    problem: Posed, step: Any, *counts: tuple[str, Any, int, int | None], through: Any = (), progress: Any = None
 ) -> None:
-    """Check options: counts by name, value, least and most.
+    """Check the options of a trace.
+
+    Args:
+        counts: for each count, its name, its value, and its smallest and largest accepted value.
 
     Raises:
         InputError: with all faults.
     """
     faults = [fault for count in counts for fault in count_faults(*count)]
-    faults += [*call_faults("progress", progress), *list_faults("through", through, _DESIGN)]
+    faults += [*call_faults("progress", progress), *list_faults("through", through, _DESIGN_EXAMPLE)]
     if not is_number(step) or not STEPS[0] <= step <= STEPS[1]:
         faults.append(Fault(f"found {step!r}; accepted: a number from {STEPS[0]:g} to {STEPS[1]:g}", ("step",)))
     for design in through if not faults else ():
-        if wrong := table_faults("through", design, _DESIGN):
+        if wrong := table_faults("through", design, _DESIGN_EXAMPLE):
             faults += wrong
         elif set(design) != set(problem.free):
             names = ", ".join(problem.free)
@@ -171,6 +172,6 @@ def check_options(
 STEPS = (1e-6, 0.1)
 """Smallest and largest `step`."""
 
-_DESIGN = "{'Fr': 1.2, 'mu': 0.1}"
-_FEWEST = 4  # points that make a curve with tangents
-_FITTING = 1e-3  # largest mismatch of the coefficients on a curve of the pattern
+_DESIGN_EXAMPLE = "{'Fr': 1.2, 'mu': 0.1}"
+_MIN_POINTS = 4  # fewest points of a curve with tangents
+_MAX_RESIDUAL = 1e-3  # largest mismatch of the coefficients on a curve of the pattern
