@@ -193,7 +193,7 @@ def plan_survey(
     names = axes_of(problem, axes)
     sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
     user_quantities = {} if quantities is None else quantities
-    faults = layer_faults(layers, LAYERS) + table_faults(
+    faults = layer_faults(layers, list(LAYERS)) + table_faults(
         "quantities", user_quantities, "{'wheel_load': 'load_front/2'}"
     )
     if not faults:
