@@ -1,7 +1,8 @@
 """The front of two objectives.
 
 A sub-problem (here: probe) limits one objective by eps and minimises the other. The next eps lies in the stretch
-between those two neighbouring points of the front that are farthest apart.
+between those two neighbouring points of the front that are farthest apart. Points whose designs change continuously
+along the front belong to one branch; the designs of another branch can be better.
 """
 
 import math
@@ -158,20 +159,22 @@ class _Search:
             objectives[k] <= low[k] + margin or objectives[1 - k] >= low[1 - k] - _ROUNDING * self.solver.ranges[1 - k]
         )
 
-    def plan_probe(self, s: _Stretch, place: int, share: float = 0.5, few_starts: bool = False) -> "_ProbeRequest":
+    def plan_probe(self, s: _Stretch, place: int, share: float = 0.5, quick: bool = False) -> "_ProbeRequest":
         """A probe between two neighbours.
 
         Args:
             place: number of the probe among those planned together.
             share: position of the limit in its unknown range, from 0 (low end) to 1.
-            few_starts: first try the designs of the neighbours alone.
+            quick: first try to start only from the designs of the neighbours.
         """
         low, high = s.unknown
         eps = low + (high - low) * (0.5 if s.suspect else share)
         neighbours, k, fallback = (s.left.solution, s.right.solution), 1 - s.axis, s.right if s.axis else s.left
-        quick = ((neighbours[:1] if self._are_close(*neighbours) else neighbours, True),) if few_starts else ()
+        attempts = ((neighbours[:1] if self._are_close(*neighbours) else neighbours, True),) if quick else ()
         good_value = fallback.objectives[k] + _INACTIVE * self.solver.ranges[k]
-        return _ProbeRequest(s.axis, eps, (*quick, (neighbours, False)), good_value, fallback, len(self.probes) + place)
+        return _ProbeRequest(
+            s.axis, eps, (*attempts, (neighbours, False)), good_value, fallback, len(self.probes) + place
+        )
 
     def probe(self, requests: Sequence["_ProbeRequest"]) -> list[_Probe | None]:
         """Solve probes in parallel; after Ctrl-C the finished ones are kept."""
@@ -267,10 +270,10 @@ class _Search:
                 break
             done, _ = self.steps
             self.steps = done, done + len(gap_candidates) + sum(s.halvings for s in kink_stretches)
-            few_starts = [not gap_candidates and s.halvings > 1 for s in chosen]
-            probes = self.probe([self.plan_probe(s, k, few_starts=few_starts[k]) for k, s in enumerate(chosen)])
-            for s, only_few, probe in zip(chosen, few_starts, probes, strict=True):
-                if (point := probe and probe.point) and not (gap_candidates or only_few):
+            quick_flags = [not gap_candidates and s.halvings > 1 for s in chosen]
+            probes = self.probe([self.plan_probe(s, k, quick=quick_flags[k]) for k, s in enumerate(chosen)])
+            for s, is_quick, probe in zip(chosen, quick_flags, probes, strict=True):
+                if (point := probe and probe.point) and not (gap_candidates or is_quick):
                     ends = s.left.solution, s.right.solution
                     if not any(self._are_close(point.solution, end) for end in ends):
                         return True
@@ -300,8 +303,8 @@ class _ProbeRequest:
 def _solve_request(solver: FrontSolver, request: _ProbeRequest) -> _Probe | None:
     """Solve a probe; return None if it is dropped."""
     point, solver = None, solver.reseed(request.count)
-    for near, few_starts in request.attempts:
-        solution = minimise_limited(solver, 1 - request.axis, {request.axis: request.eps}, near, few_starts)
+    for near, nearby_only in request.attempts:
+        solution = minimise_limited(solver, 1 - request.axis, {request.axis: request.eps}, near, nearby_only)
         point = None if solution is None else front_point(solver, solution)
         if point is not None and point.objectives[1 - request.axis] <= request.good_value:
             return _Probe(request.axis, request.eps, point)
@@ -311,7 +314,7 @@ def _solve_request(solver: FrontSolver, request: _ProbeRequest) -> _Probe | None
 
 
 def _assemble_front(search: _Search, front: Front) -> Front:
-    """The front for the report: all points with a label, and of the others those that are not too close to a point."""
+    """The front for the report: all points with a label, and the others unless they are too close to another point."""
     stretches = search.find_stretches()
     chain = [stretches[0].left, *(s.right for s in stretches)]
     labels = [list[str]() for _ in chain]
@@ -334,15 +337,15 @@ def _assemble_front(search: _Search, front: Front) -> Front:
         if labels[i] or min(x - last_position, next_label - x) >= _MIN_SPACING * spacing:
             indices.append(i)
             last_position = x
-    place = {i: k for k, i in enumerate(indices)}
+    new_index = {i: k for k, i in enumerate(indices)}
     designs = dict(map_items(search.executor, _add_cover, search.solver, [chain[i].solution for i in indices]))
     limit = "the search stopped at its limit of sub-problems; ask for more points"
     notes = (limit,) if search.is_exhausted else ()
     return replace(
         front,
         points=tuple(replace(chain[i], solution=designs[k], label="; ".join(labels[i])) for k, i in enumerate(indices)),
-        kinks=tuple(replace(kink, index=place[kink.index]) for kink in kinks),
-        gaps=tuple(replace(gap, index=place[gap.index]) for gap in gaps),
+        kinks=tuple(replace(kink, index=new_index[kink.index]) for kink in kinks),
+        gaps=tuple(replace(gap, index=new_index[gap.index]) for gap in gaps),
         solved=len(search.probes) + 2,
         notes=notes,
     )

@@ -43,8 +43,8 @@ def pareto(
 
     With two objectives, each sub-problem minimises one and limits the other by eps. The next eps lies between the
     neighbours that are farthest apart, on the objective that changes more there; sweeps in both directions then keep
-    the better design. With three objectives, the limits on two of them form a grid over their ranges in the payoff
-    table, of points × points but at most 12 × 12 values. Gaps narrower than the spacing of the points may be missed.
+    the better design. With three objectives, the limits on two of them form a grid of points × points values, at most
+    12 × 12, over their ranges at the ends of the front. Gaps narrower than the spacing of the points may be missed.
     After Ctrl-C the points found are returned, if one end is known.
 
     Args:

@@ -121,12 +121,14 @@ def minimise_limited(
     k: int,
     limits: Mapping[int, float],
     near: Sequence[Solution],
-    few_starts: bool = False,
+    nearby_only: bool = False,
     fixed_objective: int | None = None,
 ) -> Solution | None:
-    """Minimise objective `k` with limits on others, from nearby designs and, unless `few_starts`, new starts.
+    """Minimise objective `k` with limits on others, from nearby designs and, unless `nearby_only`, new starts.
 
     Args:
+        k: index of the minimised objective.
+        limits: index of another objective → its limit.
         fixed_objective: an objective at its best value; if this value is a bound of a parameter, the parameter is
             fixed there.
 
@@ -138,10 +140,10 @@ def minimise_limited(
         problem = _fix_at_bound(solver, problem, fixed_objective, near[0])
     results = [
         solver.solve(
-            problem, (0 if few_starts else solver.options.starts) if near else RETRY, near, without_sample=few_starts
+            problem, (0 if nearby_only else solver.options.starts) if near else RETRY, near, without_sample=nearby_only
         )
     ]
-    if not few_starts and all(s.status != "optimal" for s in results):
+    if not nearby_only and all(s.status != "optimal" for s in results):
         results.append(solver.reseed(1).solve(problem, RETRY))
     best = min((s for s in results if s.status == "optimal"), key=lambda s: s.value, default=None)
     return best if best is None or not solver.ranges else _improve_loose(solver, k, limits, best)
@@ -167,7 +169,7 @@ def limit_names(solver: FrontSolver) -> tuple[str, ...]:
 
 
 def objective_values(solver: FrontSolver, solution: Solution) -> tuple[float, ...]:
-    """Values of all objectives, computed from the parameters; each is the worst over the cases of the solution."""
+    """Values of all objectives from the parameters; each is the worst over the cases (scenarios, tolerances)."""
     problem = solver.problem
     if not (problem.scenarios or problem.tolerances or solution.problem.posed.asks_radius):
         values = problem.values(solution.parameters)
