@@ -192,35 +192,33 @@ def plan_survey(
     problem = pose(problem)
     names = axes_of(problem, axes)
     sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
-    user_quantities = {} if quantities is None else quantities
+    user_layers = {} if quantities is None else quantities
     faults = layer_faults(layers, list(LAYERS)) + table_faults(
-        "quantities", user_quantities, "{'wheel_load': 'load_front/2'}"
+        "quantities", user_layers, "{'wheel_load': 'load_front/2'}"
     )
     if not faults:
         reserved = {*LAYERS, *names, "about"}
         message = f"accepted: letters, digits and _, other than {' '.join(sorted(reserved))}"
-        bad_names = [n for n in user_quantities if n in reserved or not (n.isidentifier() and n.isascii())]
+        bad_names = [n for n in user_layers if n in reserved or not (n.isidentifier() and n.isascii())]
         faults = [Fault(f"found the name {n!r}; {message}", ("quantities",)) for n in bad_names]
-        if not (layers or user_quantities):
+        if not (layers or user_layers):
             faults.append(Fault(f"found none; accepted: some of {' '.join(LAYERS)}", ("layers",)))
     if faults:
         raise InputError(faults)
-    expressions = {_QUANTITY + n: e for n, e in parse_all(problem, user_quantities).items()}
+    expressions = {_QUANTITY + n: e for n, e in parse_all(problem, user_layers).items()}
     message = f"found {RADIUS}, which needs a search for every design; accepted: quantities with a formula"
-    if faults := [
-        Fault(message, ("quantities", n)) for n in user_quantities if RADIUS in expressions[_QUANTITY + n].names
-    ]:
+    if faults := [Fault(message, ("quantities", n)) for n in user_layers if RADIUS in expressions[_QUANTITY + n].names]:
         raise InputError(faults)
     if {"satisfied", "margin"} & set(layers):
         expressions |= {_LIMIT + n: c for n, c in limits_of(problem).items()}
     expressions |= parse_all(problem, {n: n for n in problem.model.coefficient_names()})
     root_expressions = {n: e for n, e in expressions.items() if set(ROOT_NAMES) & set(e.names)}
-    types = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *user_quantities)}
+    types = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *user_layers)}
     return Survey(
         problem,
         Grid(names, tuple(np.linspace(*problem.free[n], m) for n, m in zip(names, sizes, strict=True))),
         {n: np.dtype(np.float32) if single and d == np.float64 else d for n, d in types.items()},
-        dict(user_quantities),
+        dict(user_layers),
         formulas=array_function(problem, {n: e for n, e in expressions.items() if n not in root_expressions}),
         root_formulas=array_function(problem, root_expressions),
     )
