@@ -9,9 +9,9 @@ of the two masses (z points down, so zeta < 0), `lambda_s` steer axis tilt in ra
 (negative). In the notes r = sqrt(zeta_B/zeta_H) and h = sqrt(zeta_B zeta_H).
 
 Every function takes floats or arrays, broadcasts them, and returns float64 of the broadcast shape, with a
-leading axis where the docstring says so. No value raises or warns: a pole gives inf or nan, and the root of a
-negative number nan. "chi_H = 1" in a docstring is a condition, not an argument. Exact number types give exact results
-if they have `sqrt`, and the type of lambda_s has `tan`.
+leading axis where the docstring says so. No value of an argument causes an error or a warning: a pole gives inf or
+nan, and the square root of a negative number gives nan. "chi_H = 1" in a docstring is a condition, not an argument.
+Exact number types give exact results if they have a method `sqrt`, and lambda_s also a method `tan`.
 """
 
 from collections.abc import Callable
@@ -52,6 +52,7 @@ LABELS: dict[str, str] = {
     "epset": "Froude number on the EP set (2EP2, EP4, CEP2), chi_H = 1",
     "dp": "design principle: chi_B and the range of tan(lambda_s), chi_H = 1",
 }
+"""Label of an equation in the source → its meaning."""
 
 bench: dict[str, float] = {
     "w": 1.0,
@@ -97,7 +98,7 @@ _sqrt: Callable[[Real], Real] = np.sqrt
 def matrices(
     Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real
 ) -> tuple[Array, Array, Array]:
-    """M, V, P of M q'' + V q' + P q = 0, q = (lean, steer); of shape (..., 2, 2). Equation `matrices`.
+    """Matrices M, V, P of M q'' + V q' + P q = 0 with q = (lean, steer), of shape (..., 2, 2). Equation `matrices`.
 
     Example:
         >>> M, V, P = tmsopt.laws.matrices(Fr=1, mu=0.1, chi_B=1.2, chi_H=1.02, zeta_B=-0.4, zeta_H=-0.2, lambda_s=0)
@@ -124,8 +125,8 @@ def matrices(
 def copo(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Array:
     """Coefficients a0, ..., a4 of the characteristic polynomial, shape (5, ...). Equation `copo`.
 
-    They are det(M s^2 + V s + P) / (mu nu_H cos(lambda_s)): not monic, and a0 < 0 where nu_H < 0. The order
-    is the one of `np.polyval`.
+    The polynomial is det(M s^2 + V s + P) / (mu nu_H cos(lambda_s)). It is not monic, and a0 < 0 where nu_H < 0. The
+    order is the same as in `np.polyval`.
 
     Example:
         >>> a = tmsopt.laws.copo(2.337214017, 20.84626701, 1.19, 1.02, -0.4, -0.2, 0.8514403685)  # four roots at -1
@@ -147,9 +148,9 @@ def copo(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Rea
 def flus(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
     """Square of the critical Froude number of weaving; not finite at chi_B = chi_H. Equation `flus`.
 
-    It is the zero of a1 a2 a3 - a0 a3^2 - a1^2 a4 in Fr^2, for every chi_H and either sign of lambda_s. It is
-    negative if no speed gives a zero. It bounds the stable speeds only where a0, a1, a3, a4 have one sign, and is
-    positive there for chi_H > 0. Elsewhere a positive value is not a stability boundary.
+    At this value of Fr^2, a1 a2 a3 - a0 a3^2 - a1^2 a4 is zero, for every chi_H and either sign of lambda_s. The value
+    is negative if no speed gives a zero. It bounds the stable speeds only where a0, a1, a3, a4 have the same sign, and
+    is positive there for chi_H > 0. Elsewhere a positive value is not a stability boundary.
 
     Example:
         >>> square = tmsopt.laws.flus(0.1, 1.2, 1.02, -0.4, -0.2, tmsopt.laws.bench["lambda_s"])
@@ -168,7 +169,7 @@ def flus(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_
 
 @_law
 def Fr_c(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """Critical Froude number, the root of `flus`; nan where that square is negative.
+    """Critical Froude number, the square root of `flus`; nan where `flus` is negative.
 
     Example:
         >>> print(f"{tmsopt.laws.Fr_c(0.1, 1.2, 1.02, -0.4, -0.2, tmsopt.laws.bench['lambda_s']):.6f}")
@@ -181,13 +182,14 @@ def Fr_c(mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_
 
 @_law
 def lscf(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Truth:
-    """The five printed stability conditions in printed order, boolean of shape (5, ...). Equation `lscf`.
+    """The five stability conditions in the order of the paper, boolean of shape (5, ...). Equation `lscf`.
 
-    For lambda_s > 0 all five are necessary, and with chi_H >= 1 sufficient. With chi_H < 1 they are NOT
-    sufficient, contrary to the paper: a1 > 0, or zeta_B chi_H < zeta_H chi_B, is missing. Counterexample:
-    chi_H = 0.9, chi_B = 1.2, zeta_B = -0.5, zeta_H = -0.4, mu = 5, tan(lambda_s) = 0.5, where Fr_c = 1:
-    unstable at every Fr > 1. For lambda_s < 0 they never hold together; there a bicycle is stable exactly if
-    the first four are reversed, zeta_B chi_H > zeta_H chi_B and Fr > Fr_c. `lscf_complete` is valid everywhere.
+    For lambda_s > 0 all five are necessary; for chi_H >= 1 they are also sufficient. For chi_H < 1 they are NOT
+    sufficient, contrary to the paper: the condition a1 > 0, that is zeta_B chi_H < zeta_H chi_B, is missing. A
+    counterexample is chi_H = 0.9, chi_B = 1.2, zeta_B = -0.5, zeta_H = -0.4, mu = 5, tan(lambda_s) = 0.5 with
+    Fr_c = 1: it is unstable at every Fr > 1. For lambda_s < 0 the five never hold together; there a bicycle is stable
+    exactly if the first four are reversed, zeta_B chi_H > zeta_H chi_B and Fr > Fr_c. `lscf_complete` is valid
+    everywhere.
 
     Example:
         >>> benchmark = 0.1, 1.2, 1.02, -0.4, -0.2, tmsopt.laws.bench["lambda_s"]
@@ -211,7 +213,8 @@ def lscf(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Rea
 def lscf_complete(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Truth:
     """True if the bicycle is asymptotically stable, by the complete Lienard-Chipart conditions on `copo`.
 
-    It holds for any chi_H and either sign of lambda_s, because the coefficients are divided by the sign of a0.
+    The result is valid for any chi_H and either sign of lambda_s, because the coefficients are multiplied by the sign
+    of a0.
 
     Example:
         >>> from math import atan
@@ -257,7 +260,7 @@ class EP4(NamedTuple):
 
 @_law
 def w0(mu: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """-(a4/a0)^(1/4), the lower bound of the spectral abscissa; nan where a4/a0 < 0. Equation `w0`.
+    """The lower bound -(a4/a0)^(1/4) of the spectral abscissa; nan where a4/a0 < 0. Equation `w0`.
 
     Example:
         >>> print(f"{tmsopt.laws.w0(0.1, 1, -0.4, -0.2, 0.3):.8f} {-(0.4 * 0.2) ** -0.25:.8f}")
@@ -271,7 +274,7 @@ def w0(mu: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Rea
 
 @_law
 def poly4(omega0: Real) -> Array:
-    """Coefficients of (s - omega0)^4, shape (5, ...). Label `4poly`, where p(s) means the monic copo / a0.
+    """Coefficients of (s - omega0)^4, shape (5, ...). Equation `4poly`; its p(s) is the monic polynomial copo / a0.
 
     Example:
         >>> tmsopt.laws.poly4(-1)
@@ -284,7 +287,7 @@ def poly4(omega0: Real) -> Array:
 
 @_law
 def a1a3(Fr: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real, omega0: Real) -> Array:
-    """Residuals a1 + 4 omega0 a0 and a3 + 4 omega0^3 a0, shape (2, ...); both 0 at EP4. Equation `a1a3`.
+    """Residuals a1 + 4 omega0 a0 and a3 + 4 omega0^3 a0, shape (2, ...); both are 0 at EP4. Equation `a1a3`.
 
     Example:
         >>> residuals = tmsopt.laws.a1a3(2.337214017, 1.19, 1.02, -0.4, -0.2, 0.8514403685, omega0=-1)
@@ -299,7 +302,7 @@ def a1a3(Fr: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_
 
 @_law
 def chib(omega0: Real, chi_H: Real, zeta_B: Real, zeta_H: Real) -> Real:
-    """chi_B at EP4: the scaling law that makes a3/a1 = omega0^2. Equation `chib`.
+    """chi_B at EP4. This scaling law gives a3/a1 = omega0^2. Equation `chib`.
 
     Example:
         >>> print(f"{tmsopt.laws.chib(-1, 1.02, -0.4, -0.2):.6f}")
@@ -312,7 +315,7 @@ def chib(omega0: Real, chi_H: Real, zeta_B: Real, zeta_H: Real) -> Real:
 
 @_law
 def a2(Fr: Real, mu: Real, chi_H: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real, omega0: Real) -> Real:
-    """Left minus right side of the EP4 condition a2 = 6 omega0^2 a0, divided by zeta_B. Equation `a2`.
+    """Left side minus right side of the EP4 condition a2 = 6 omega0^2 a0, divided by zeta_B. Equation `a2`.
 
     Example:
         >>> residual = tmsopt.laws.a2(2.337214017, 20.84626701, 1.02, -0.4, -0.2, 0.8514403685, omega0=-1)
@@ -366,12 +369,13 @@ def e3(Fr: Real, mu: Real, lambda_s: Real) -> Real:
 
 @_law
 def ep4(omega0: Real, zeta_B: Real, zeta_H: Real, chi_H: Real) -> tuple[EP4, EP4]:
-    """Both designs with the four-fold root `omega0`, from `chib`, `a1a3`, `a2` and `w0`; fields of one shape.
+    """Both designs with the four-fold root `omega0`, from `chib`, `a1a3`, `a2` and `w0`.
 
-    For zeta_B, zeta_H < 0 both are real. The first is the bicycle: Fr > 0 if omega0 < 0 < chi_H, and mu > 0
-    requires (chi_H - 1) (zeta_H - zeta_B) (abs(w01) - abs(omega0)) > 0. The second always has mu < 0. Fr, mu and
-    tan_lambda_s are nan where complex (possible for zeta_H > 0), at zeta_B = zeta_H (no EP4 exists), and at
-    chi_H = 1, where omega0 must be `w01` and mu is free: use `ep4_chi_H_1`.
+    All fields have the same shape. For zeta_B, zeta_H < 0 both designs are real. The first can be a bicycle: it has
+    Fr > 0 if omega0 < 0 < chi_H, and mu > 0 only if (chi_H - 1) (zeta_H - zeta_B) (abs(w01) - abs(omega0)) > 0. The
+    second always has mu < 0. Fr, mu and tan_lambda_s are nan where they would be complex (possible for zeta_H > 0), at
+    zeta_B = zeta_H, where no EP4 exists, and at chi_H = 1, where omega0 must be `w01` and mu is free: use
+    `ep4_chi_H_1` there.
 
     Example:
         >>> bicycle, other = tmsopt.laws.ep4(-1, -0.4, -0.2, 1.02)
@@ -380,9 +384,9 @@ def ep4(omega0: Real, zeta_B: Real, zeta_H: Real, chi_H: Real) -> tuple[EP4, EP4
 
     More: docs/explanation/paper.md
     """
-    # With u = zeta_H T - k the conditions leave a quadratic in u. Its discriminant is a sum of squares in
-    # y = -omega0^2 zeta_H, and S > 2, so neither root cancels, however close they are. The second root has
-    # u + k = k lift / (zeta_B S), also without a difference.
+    # With u = zeta_H T - k the conditions reduce to a quadratic equation for u. Its discriminant is a sum of squares in
+    # y = -omega0^2 zeta_H, and S > 2, so neither root loses digits by cancellation, even if the two are close. The
+    # second root has u + k = k lift / (zeta_B S), which needs no difference of nearly equal numbers either.
     k, y, fall = chi_H - 1, -(omega0**2) * zeta_H, zeta_B - zeta_H
     S = 1 + 6 * y + y**2 + _sqrt((1 - y) ** 4 + 16 * y * (1 + y) ** 2 * (1 - 2 / chi_H) ** 2)
     u = -S * fall * chi_H**2 / (32 * y * (1 + y) ** 2 * zeta_B)
@@ -410,7 +414,7 @@ def ep4(omega0: Real, zeta_B: Real, zeta_H: Real, chi_H: Real) -> tuple[EP4, EP4
 
 @_law
 def Frc1(chi_B: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """Square of the critical Froude number for chi_H = 1; it has the sign of `flus`. Equation `Frc1`.
+    """Square of the critical Froude number for chi_H = 1; it has the same sign as `flus`. Equation `Frc1`.
 
     Example:
         >>> square = tmsopt.laws.Frc1(2**0.5, -0.4, -0.2, tmsopt.laws.ep4_chi_H_1(-0.4, -0.2).lambda_s)
@@ -424,7 +428,7 @@ def Frc1(chi_B: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
 
 @_law
 def chibm(zeta_B: Real, zeta_H: Real) -> Real:
-    """chi_B that minimises `Frc1` between its poles chi_B = 1 and zeta_B/zeta_H. Equation `chibm`.
+    """The chi_B that minimises `Frc1` between its poles chi_B = 1 and chi_B = zeta_B/zeta_H. Equation `chibm`.
 
     Example:
         >>> print(f"{tmsopt.laws.chibm(-0.4, -0.2):.8f}")  # the square root of 2
@@ -437,9 +441,9 @@ def chibm(zeta_B: Real, zeta_H: Real) -> Real:
 
 @_law
 def frm(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """The least critical Froude number over chi_B (not its square), at `chibm`. Equation `frm`.
+    """The smallest critical Froude number over chi_B (not its square); chi_B is `chibm` there. Equation `frm`.
 
-    nan unless abs(zeta_B) > abs(zeta_H) and lambda_s >= 0, or both reversed.
+    It is nan unless abs(zeta_B) > abs(zeta_H) and lambda_s >= 0, or both inequalities are reversed.
 
     Example:
         >>> tilt = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2).lambda_s
@@ -454,7 +458,7 @@ def frm(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
 
 @_law
 def w01(zeta_B: Real, zeta_H: Real) -> Real:
-    """The four-fold root -(zeta_B zeta_H)^(-1/4), also the bound `w0`, for chi_H = 1. Equation `w01`.
+    """The four-fold root -(zeta_B zeta_H)^(-1/4) for chi_H = 1; it equals the bound `w0`. Equation `w01`.
 
     Example:
         >>> print(f"{tmsopt.laws.w01(-0.4, -0.2):.8f} {-(5**0.5) / 2**0.25:.8f}")  # Table 1
@@ -480,7 +484,7 @@ def chib1(zeta_B: Real, zeta_H: Real) -> Real:
 
 @_law
 def tls(zeta_B: Real, zeta_H: Real) -> Real:
-    """tan(lambda_s) at EP4, as printed, not lambda_s; negative for abs(zeta_B) < abs(zeta_H). Equation `tls`.
+    """tan(lambda_s) at EP4, not lambda_s itself; it is negative for abs(zeta_B) < abs(zeta_H). Equation `tls`.
 
     Example:
         >>> print(f"{tmsopt.laws.tls(-0.4, -0.2):.8f} {15 / 4 - 75 / 32 * 2**0.5:.8f}")
@@ -495,10 +499,10 @@ def tls(zeta_B: Real, zeta_H: Real) -> Real:
 
 @_law
 def frep4(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
-    """Both roots of the printed quadratic for Fr at EP4: the true one, then the spurious. Equation `frep4`.
+    """Both roots of the paper's quadratic equation for Fr at EP4: first the true, then the spurious. Equation `frep4`.
 
-    The quadratic contains `tls`. The true root is positive. The spurious one is not an EP4 and never positive:
-    -(r - 1)^2 abs(omega0) / (4 (r + 1)).
+    The quadratic equation contains `tls`. The true root is positive. The spurious root is not an EP4; it equals
+    -(r - 1)^2 abs(omega0) / (4 (r + 1)) and is never positive.
 
     Example:
         >>> true, spurious = tmsopt.laws.frep4(-0.4, -0.2)
@@ -515,10 +519,10 @@ def frep4(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
 
 @_law
 def epset(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
-    """Froude number at which chi_H = 1 and chi_B = `chib1` give two double roots. Equation `epset`.
+    """Froude number at which a design with chi_H = 1, chi_B = `chib1` has two double roots. Equation `epset`.
 
-    nan unless tan(lambda_s) (r + 1)/(r - 1) > r/(4 h), which is its pole. The double roots are real (2EP2)
-    for abs(tan(lambda_s)) below abs(`tls`) and complex (CEP2) above.
+    It is nan unless tan(lambda_s) (r + 1)/(r - 1) > r/(4 h); equality is its pole. The double roots are real (2EP2)
+    if abs(tan(lambda_s)) is smaller than abs(`tls`), and complex (CEP2) if it is larger.
 
     Example:
         >>> tilt = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2).lambda_s
@@ -534,10 +538,10 @@ def epset(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
 
 @_law
 def dp(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
-    """chi_B and the largest tan(lambda_s) for which some speed gives heavy damping. Equation `dp`.
+    """chi_B, and the largest tan(lambda_s) for which some speed gives heavy damping. Equation `dp`.
 
-    The printed range 0 < tan(lambda_s) <= bound is empty for abs(zeta_B) < abs(zeta_H); by `dual` the range there
-    is bound <= tan(lambda_s) < 0.
+    The paper's range 0 < tan(lambda_s) <= bound is empty for abs(zeta_B) < abs(zeta_H). By duality (`dual`) the range
+    there is bound <= tan(lambda_s) < 0.
 
     Example:
         >>> tmsopt.laws.dp(-0.4, -0.2) == (tmsopt.laws.chib1(-0.4, -0.2), tmsopt.laws.tls(-0.4, -0.2))
@@ -553,7 +557,10 @@ def dp(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
 
 @_law
 def ep4_chi_H_1(zeta_B: Real, zeta_H: Real) -> EP4:
-    """The EP4 for chi_H = 1 in compact form; mu is nan, because any mass ratio works. All nan at zeta_B = zeta_H.
+    """The EP4 for chi_H = 1 in compact form.
+
+    mu is nan, because the EP4 does not depend on the mass ratio. At zeta_B = zeta_H no EP4 exists, and tan_lambda_s and
+    Fr are nan.
 
     Example:
         >>> design = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2)
@@ -563,7 +570,7 @@ def ep4_chi_H_1(zeta_B: Real, zeta_H: Real) -> EP4:
     More: docs/explanation/paper.md
     """
     r, h = _sqrt(zeta_B / zeta_H), _sqrt(zeta_B * zeta_H)
-    step = np.where(r == 1, np.nan, (r**2 + 6 * r + 1) / (r + 1))[()]  # r = 1 has a1 = a3 = 0, so no EP4
+    step = np.where(r == 1, np.nan, (r**2 + 6 * r + 1) / (r + 1))[()]  # a1 = a3 = 0 at r = 1: no EP4 exists
     return EP4(-1 / _sqrt(h), r, (r - 1) * step / (16 * h), step / (4 * _sqrt(h)), np.nan * r)
 
 
@@ -583,10 +590,11 @@ def Fr_c2_chi_H_1(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
 
 @_law
 def dual(Fr: Real, chi_B: Real, zeta_B: Real, zeta_H: Real, lambda_s: Real) -> dict[str, Real]:
-    """The dual design, with the same spectrum for chi_H = 1, as keywords; its dual is the first design.
+    """The dual design, which has the same spectrum for chi_H = 1, as keyword arguments.
 
-    Duality exchanges the heights of the masses and the sign of lambda_s, so it maps the two classes of stable
-    bicycles onto each other. Pass the result to `copo` with chi_H = 1 and any mu.
+    The dual of the dual is the original design. Duality exchanges the heights of the masses and reverses the sign of
+    lambda_s, so it maps the two classes of stable bicycles onto each other. Pass the result to `copo` with chi_H = 1
+    and any mu.
 
     Example:
         >>> bicycle = dict(Fr=2, chi_B=1.4, zeta_B=-0.4, zeta_H=-0.2, lambda_s=0.3)

@@ -1,7 +1,7 @@
 """Charts: classes, roots and quantities over grids of designs, in memory or in a folder.
 
-In: a problem with two or three free parameters. Out: a `Chart` of layers. Open `chart` first; `survey` computes it tile
-by tile, `folder` keeps it on disk.
+Input: a problem with two or three free parameters. Result: a `Chart`. It has layers, which are arrays with one number
+per design. Read `chart` first; `survey` computes the layers tile by tile, and `folder` stores them on disk.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""Charts: the kind of motion of each design on a grid over two or three parameters."""
+"""Charts: the class of motion and other numbers for each design on a grid over two or three parameters."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 LARGEST = 20_000_000
-"""Most designs of a chart in memory, about 40 bytes each."""
+"""Largest number of designs of a chart in memory; each takes about 40 bytes."""
 
 TILE = 2**18
-"""Designs of a tile: about 40 MB during its computation."""
+"""Number of designs that are computed together, a tile; this takes about 40 MB."""
 
-_MOST_WORKERS = 256
+_MAX_WORKERS = 256
 
 
 def _layer_property(name: str, meaning: str) -> Any:
@@ -48,13 +48,14 @@ class Chart(Printable):
     Attributes:
         about: description of the chart, as plain data.
         grid: the values along each axis.
-        layers: name → array of shape (len(second), len(first)), as an image, with a third axis in front. Layers in a
-            folder are memory maps.
-        counts: over all designs.
+        layers: name → array with the second axis along its rows and the first along its columns, as in an image; a
+            third axis is the first index. Layers in a folder are memory maps.
+        counts: counts over all designs.
         domain: the exact boundaries in a plane, if requested.
-        path: of its folder; None in memory.
-        run: ``engine``, ``seconds``, ``per_second``, and for a folder the number of ``designs`` computed now; empty for
-            an opened chart.
+        path: the folder of the chart; None for a chart in memory.
+        run: ``engine``, ``seconds``, ``per_second``, and for a folder the number of ``designs`` that this call
+            computed; empty for an opened chart.
+        asked: the charted problem; None if the folder does not hold its model.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])  # stable where c and k are positive
@@ -78,13 +79,14 @@ class Chart(Printable):
     kind = _layer_property("kind", "Class codes from the coefficients: indices into `tmsopt.roots.CLASSES`.")
     abscissa = _layer_property(
         "abscissa",
-        "Abscissa of roots that give back the coefficients, also near an exceptional point; nan if undefined.",
+        "Abscissa, from roots that reproduce the coefficients, also near an exceptional point; nan if undefined.",
     )
     damping_ratio = _layer_property("damping_ratio", "Damping ratio of the same roots; nan if undefined.")
     real_roots = _layer_property("real_roots", "Number of distinct real roots, from the coefficients.")
     satisfied = _layer_property("satisfied", "Whether every inequality constraint of the problem holds.")
     margin = _layer_property(
-        "margin", "Least distance of the sides of an inequality, negative if one is violated; nan if undefined."
+        "margin",
+        "Smallest difference between the sides of an inequality, negative if one is violated; nan if undefined.",
     )
 
     @property
@@ -97,7 +99,7 @@ class Chart(Printable):
         """The charted problem.
 
         Raises:
-            InputError: for an opened folder with a model of the user, which the folder does not hold.
+            InputError: for an opened folder with a model that the user defined, because the folder does not hold it.
         """
         if self.asked is None:
             name = self.about["problem"]["model"]
@@ -108,7 +110,7 @@ class Chart(Printable):
 
     @property
     def quantities(self) -> dict[str, NDArray[Any]]:
-        """Name → values of an expression of the user."""
+        """Name → values of an expression that the user gave."""
         return {n: layer for n, layer in self.layers.items() if n not in LAYERS}
 
     @property
@@ -118,14 +120,14 @@ class Chart(Printable):
 
     @property
     def left_aside(self) -> tuple[str, ...]:
-        """Names of the equality constraints, which a chart ignores: they hold on curves, which `trace` follows."""
+        """Names of the equality constraints. A chart ignores them, because they hold only on curves; see `trace`."""
         return tuple(n for n, c in self.problem.posed.conditions.items() if c.equality)
 
     def save(self, path: str | Path, layers: Sequence[str] | None = None) -> None:
         """Write axes and layers as a NumPy archive, or as netCDF if the path ends in ``.nc``.
 
         Args:
-            layers: names; all by default.
+            layers: names of layers; all by default.
 
         Raises:
             InputError: for unknown layers; for netCDF if xarray or a netCDF library is missing.
@@ -143,26 +145,28 @@ class Chart(Printable):
         Raises:
             InputError: if xarray is not installed.
         """
-        made: Dataset = make_dataset(self.problem.posed, Grid(self.axes, self.grid), self.layers)
-        return made
+        dataset: Dataset = make_dataset(self.problem.posed, Grid(self.axes, self.grid), self.layers)
+        return dataset
 
     def to_json(self) -> dict[str, Any]:
         """Summary, boundaries and corners, without the arrays."""
-        counts, plane = self.counts, self.path is None and len(self.grid) == 2
-        of = self.asked.posed.parameter_set if self.asked else None  # a folder may not hold its model
+        counts, is_plane = self.counts, self.path is None and len(self.grid) == 2
+        parameters = self.asked.posed.parameter_set if self.asked else None  # a folder may not hold its model
         grid = Grid(self.axes, self.grid)
-        place = grid.design(counts.place) if counts.place >= 0 else None
+        design = grid.design(counts.place) if counts.place >= 0 else None
         data: dict[str, Any] = {
             "schema": 1,
             "title": self.about["title"],
             "model": self.about["problem"]["model"],
-            "axes": {n: {**axis, "unit": of[n].unit if of else "1"} for n, axis in grid.describe().items()},
-            **({} if plane else {"layers": list(self.layers)}),
+            "axes": {
+                n: {**axis, "unit": parameters[n].unit if parameters else "1"} for n, axis in grid.describe().items()
+            },
+            **({} if is_plane else {"layers": list(self.layers)}),
             "classes": counts.shares,
             "satisfied": None if counts.satisfied is None else counts.satisfied / counts.designs,
-            "least_abscissa": place and {"value": counts.least, **place},
+            "least_abscissa": design and {"value": counts.least, **design},
         }
-        if plane or self.domain:
+        if is_plane or self.domain:
             data["boundaries"] = self.domain and self.domain.to_json()
         data["fallbacks"] = counts.fallbacks
         if self.path is not None:
@@ -188,25 +192,26 @@ def chart(
 ) -> Chart:
     """Classify every design of a grid over the two or three free parameters; the others must be fixed.
 
-    Equality constraints are ignored. A chart in a folder continues where the same call stopped before.
+    Equality constraints are ignored. If the same call was stopped before, a chart in a folder is continued.
 
     Args:
         problem: a problem, its file, or a solution.
         axes: the free parameters, the horizontal one first; by default in the problem's order.
-        folder: folder for the arrays, e.g. ``big.chart``, up to 1e9 designs; by default in memory, up to 2e7.
-        points: along each axis, 400x300 or 120x100x80 by default; the ends of the box are grid points.
-        layers: names among `tmsopt.charts.LAYERS`; all by default, all but the margin in a folder.
+        folder: folder for the arrays, e.g. ``big.chart``, for up to 1e9 designs; by default they are in memory, for
+            up to 2e7.
+        points: numbers of points along the axes, by default 400x300 or 120x100x80; the ends of the box are grid points.
+        layers: names from `tmsopt.charts.LAYERS`; by default all, and in a folder all except the margin.
         quantities: name → expression of an additional layer.
         single: store numbers in single precision.
-        workers: number of processes; 1 computes in this one.
+        workers: number of processes; with 1, no further process is started.
         fresh: move an existing folder aside.
-        tile: designs computed at a time.
-        boundaries: also trace the exact boundary curves in a plane.
+        tile: number of designs computed together.
+        boundaries: also trace the exact boundary curves, if there are two axes.
         progress: called with a `tmsopt.Progress` from time to time.
 
     Raises:
-        InputError: for bad input; for a damaged folder, or one with another chart, with the differences; if a worker
-            crashes.
+        InputError: for bad input; for a damaged folder; for a folder with another chart, with the differences; if a
+            worker crashes.
         OSError: if the disk is full; tiles recorded before stay valid.
 
     Example:
@@ -218,38 +223,45 @@ def chart(
 
     More: docs/how_to/charts.md
     """
-    faults = count_faults("workers", workers, 1, _MOST_WORKERS) + count_faults("tile", tile, 1)
+    faults = count_faults("workers", workers, 1, _MAX_WORKERS) + count_faults("tile", tile, 1)
     if faults := faults + call_faults("progress", progress):
         raise InputError(faults)
     steps = start_steps(progress, "charting", "design") or (lambda *_: None)
-    wanted = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
-    work = plan_survey(problem, axes, points, wanted, quantities, single)
-    path, grid, about = None if folder is None else as_path(folder, "a folder"), work.grid, _describe(work, tile)
+    layer_names = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
+    survey = plan_survey(problem, axes, points, layer_names, quantities, single)
+    path, grid, about = None if folder is None else as_path(folder, "a folder"), survey.grid, _describe(survey, tile)
     if path is None and grid.size > LARGEST:
         message = f"{grid.size:.3g} designs do not fit into memory; give a folder x.chart, or at most {LARGEST:.0e}"
         raise input_error(message, "points")
     grid.tiles(tile)  # raises for too many tiles
-    memory = {} if path else {n: np.empty(grid.shape, dtype) for n, dtype in work.dtypes.items()}
-    where = write_folder(path, about, grid, fresh) if path else nullcontext(Tiles(memory, tile))
-    with where as target, processes(workers) if workers > 1 else here() as executor:
-        began = time.perf_counter()
-        remaining = [rows for rows in grid.tiles(target.tile) if rows.start not in target.done]
-        done = before = add_tallies(target.done.values()).designs
-        steps(done, grid.size)
-        for place, found in executor.map(work.compute, remaining):
-            if isinstance(found, Crash):
-                cause = f"a worker that computed {tile} designs crashed ({found.cause})"
+    memory = {} if path else {n: np.empty(grid.shape, dtype) for n, dtype in survey.dtypes.items()}
+    tiles_context = write_folder(path, about, grid, fresh) if path else nullcontext(Tiles(memory, tile))
+    with tiles_context as tiles, processes(workers) if workers > 1 else here() as executor:
+        start = time.perf_counter()
+        remaining = [rows for rows in grid.tiles(tiles.tile) if rows.start not in tiles.tallies]
+        finished = finished_before = add_tallies(tiles.tallies.values()).designs
+        steps(finished, grid.size)
+        for place, result in executor.map(survey.compute, remaining):
+            if isinstance(result, Crash):
+                cause = f"a worker that computed {tile} designs crashed ({result.cause})"
                 raise input_error(f"{cause}; give fewer workers or a smaller tile", "workers")
-            target.write(remaining[place], *found)
-            done += found[1].designs
-            steps(done, grid.size)
-    seconds, new = time.perf_counter() - began, done - before
+            tiles.write(remaining[place], *result)
+            finished += result[1].designs
+            steps(finished, grid.size)
+    seconds, computed = time.perf_counter() - start, finished - finished_before
     for layer in memory.values():
         layer.flags.writeable = False
-    run = {"engine": "numpy", **({"designs": new} if path else {}), "seconds": seconds, "per_second": new / seconds}
-    charted = work.problem.problem
-    edges = domain(charted, progress=progress) if boundaries and len(grid.axes) == 2 else None
-    return Chart(about, grid.values, target.layers, add_tallies(target.done.values()), edges, path, run, charted)
+    run = {
+        "engine": "numpy",
+        **({"designs": computed} if path else {}),
+        "seconds": seconds,
+        "per_second": computed / seconds,
+    }
+    source_problem = survey.problem.problem
+    edges = domain(source_problem, progress=progress) if boundaries and len(grid.axes) == 2 else None
+    return Chart(
+        about, grid.values, tiles.layers, add_tallies(tiles.tallies.values()), edges, path, run, source_problem
+    )
 
 
 def open_chart(path: str | Path) -> Chart:
@@ -269,7 +281,7 @@ def open_chart(path: str | Path) -> Chart:
     """
     path = as_path(path, "a folder that tmsopt.chart made")
     about, problem, tiles = read_folder(path)
-    grid, counts = grid_of(about), add_tallies(tiles.done.values())
+    grid, counts = grid_of(about), add_tallies(tiles.tallies.values())
     if counts.designs < grid.size:
         message = (
             f"'{path}' is not finished: {counts.designs} of {grid.size} designs; run its command again to finish it"
@@ -278,23 +290,23 @@ def open_chart(path: str | Path) -> Chart:
     return Chart(about, grid.values, tiles.layers, counts, path=path, asked=problem)
 
 
-def _describe(work: Survey, tile: int) -> dict[str, Any]:
+def _describe(survey: Survey, tile: int) -> dict[str, Any]:
     """Everything that identifies a chart, as plain data."""
-    problem, grid = work.problem, work.grid
-    stated: dict[str, Any] = {
+    problem, grid = survey.problem, survey.grid
+    statement: dict[str, Any] = {
         "model": problem.model.name,
         "fixed": dict(problem.fixed),
         "constraints": {n: problem.constraints[n] for n in limits_of(problem)},
     }
     if problem.model.statement is not None:
-        stated["statement"] = dict(problem.model.statement)
-    layers = {n: {"dtype": d.str} for n, d in work.dtypes.items()}
-    for name, expression in work.quantities.items():
+        statement["statement"] = dict(problem.model.statement)
+    layers = {n: {"dtype": d.str} for n, d in survey.dtypes.items()}
+    for name, expression in survey.quantities.items():
         layers[name]["expression"] = expression
     return {
         "schema": SCHEMA,
         "title": problem.title,
-        "problem": stated,
+        "problem": statement,
         "axes": grid.describe(),
         "dimensions": list(grid.axes[::-1]),
         "shape": list(grid.shape),

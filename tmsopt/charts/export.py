@@ -1,4 +1,4 @@
-"""Export of charts: one NumPy archive or netCDF file, or a dataset of xarray."""
+"""Export of charts as a NumPy archive, a netCDF file or a dataset of xarray."""
 
 import json
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ Layers = Mapping[str, NDArray[Any]]
 
 
 def save_layers(problem: Posed, grid: Grid, layers: Layers, path: Path) -> None:
-    """Write axes and layers, with a description, in the format that the file name's ending selects.
+    """Write axes and layers, with a description; the ending of the file name selects the format.
 
     Raises:
         InputError: for netCDF if xarray or a netCDF library is missing.
@@ -58,7 +58,7 @@ def make_dataset(problem: Posed, grid: Grid, layers: Layers) -> Any:
     Raises:
         InputError: if xarray is not installed.
     """
-    xarray, axes, of = import_optional("xarray"), _name_axes(grid, layers), problem.parameter_set
+    xarray, axes, parameters = import_optional("xarray"), _name_axes(grid, layers), problem.parameter_set
     # The climate and forecast conventions separate flag meanings by blanks.
     words = " ".join(n.replace(" ", "_") for n in CLASSES)
     classes = {"flag_values": np.arange(len(CLASSES), dtype=np.int8), "flag_meanings": words}
@@ -67,7 +67,7 @@ def make_dataset(problem: Posed, grid: Grid, layers: Layers) -> Any:
         for n, a in layers.items()
     }
     coordinates = {
-        axis: (axis, values, {"long_name": of[n].meaning, "units": of[n].unit})
+        axis: (axis, values, {"long_name": parameters[n].meaning, "units": parameters[n].unit})
         for n, axis, values in zip(grid.axes, axes, grid.values, strict=True)
     }
     about = {"title": problem.title, "model": problem.model.name, "fixed": json.dumps(dict(problem.fixed))}
@@ -75,5 +75,5 @@ def make_dataset(problem: Posed, grid: Grid, layers: Layers) -> Any:
 
 
 def _name_axes(grid: Grid, layers: Layers) -> list[str]:
-    """Names of the axes: the parameter's, or ``parameter.NAME`` if a layer has that name."""
+    """Names of the axes: the name of the parameter, or ``parameter.NAME`` if a layer has the same name."""
     return [f"parameter.{n}" if n in layers else n for n in grid.axes]

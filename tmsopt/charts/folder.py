@@ -2,11 +2,11 @@
 
     NAME.chart/about.json      description: problem, grid, layers; never changes
     NAME.chart/axes/Fr.npy     values along an axis, for other programs
-    NAME.chart/layers/kind.npy a layer, shape of the grid
+    NAME.chart/layers/kind.npy a layer, with the shape of the grid
     NAME.chart/tiles.jsonl     a line for every finished tile, with its counts
     NAME.chart/chart.lock      locked by the process that writes
 
-A tile is recorded after its numbers are on the disk, so the record is right whenever a process ends.
+A tile is recorded after its numbers are on the disk, so the record is correct whenever the process is stopped.
 """
 
 import errno
@@ -25,7 +25,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
-from tmsopt.charts.survey import LONGEST, MOST, MOST_TILES, Grid, Tally
+from tmsopt.charts.survey import MAX_AXIS_POINTS, MAX_DESIGNS, MAX_TILES, Grid, Tally
 from tmsopt.errors import InputError, input_error
 from tmsopt.files import from_json, list_differences, move_aside, read_lines, read_text, write_text
 from tmsopt.models import MODELS
@@ -45,23 +45,23 @@ class Tiles:
     """Layers that are filled tile by tile.
 
     Attributes:
-        layers: arrays, or memory maps; these are written as files, so that a full disk raises an error.
-        tile: designs of a tile.
-        done: first row → counts of a finished tile.
-        record: file of finished tiles, for memory maps.
-        end: where its last whole line ends.
+        layers: arrays or memory maps; the latter are written through their files, so that a full disk raises an error.
+        tile: number of designs of a tile.
+        tallies: first row of a finished tile → its counts.
+        record: file that lists the finished tiles, for memory maps.
+        end: position in this file after its last complete line.
     """
 
     layers: Layers
     tile: int
-    done: dict[int, Tally] = field(default_factory=dict)
+    tallies: dict[int, Tally] = field(default_factory=dict)
     record: Path | None = None
     end: int = 0
-    _waiting: bytes = b""
-    _synced: float = field(default_factory=time.monotonic)
+    _unrecorded: bytes = b""
+    _sync_time: float = field(default_factory=time.monotonic)
 
     def write(self, rows: range, layers: Layers, counts: Tally) -> None:
-        """Write a tile; in a folder, the next `sync` records it, about once a second."""
+        """Write a tile. In a folder it is recorded by the next call of `sync`, which happens about once a second."""
         for name, array in layers.items():
             layer = self.layers[name]
             if isinstance(layer, np.memmap):
@@ -70,15 +70,15 @@ class Tiles:
                     stream.write(array.data)
             else:
                 layer.reshape(-1, layer.shape[-1])[rows.start : rows.stop] = array
-        self.done[rows.start] = counts
+        self.tallies[rows.start] = counts
         least = counts.least if counts.place >= 0 else None  # JSON has no nan
-        self._waiting += f"{json.dumps({'row': rows.start, **asdict(counts), 'least': least})}\n".encode()
-        if time.monotonic() - self._synced > _SYNC:
+        self._unrecorded += f"{json.dumps({'row': rows.start, **asdict(counts), 'least': least})}\n".encode()
+        if time.monotonic() - self._sync_time > _SYNC:
             self.sync()
 
     def sync(self) -> None:
-        """Flush all layers to the disk, then record the tiles."""
-        if self.record is None or not self._waiting:
+        """Write all layers to the disk, then record the tiles."""
+        if self.record is None or not self._unrecorded:
             return
         for name in self.layers:
             with (self.record.parent / _layer_path(name)).open("r+b") as stream:
@@ -86,11 +86,11 @@ class Tiles:
         with self.record.open("r+b") as stream:
             stream.truncate(self.end)
             stream.seek(self.end)
-            stream.write(self._waiting)
+            stream.write(self._unrecorded)
             stream.flush()
             os.fsync(stream.fileno())
-        self.end += len(self._waiting)
-        self._waiting, self._synced = b"", time.monotonic()
+        self.end += len(self._unrecorded)
+        self._unrecorded, self._sync_time = b"", time.monotonic()
 
 
 @contextmanager
@@ -98,11 +98,12 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
     """Open the layers of a new or unfinished chart in a folder; one process at a time writes them.
 
     Args:
-        about: identifies the chart, except for versions and tile size.
+        about: description that identifies the chart; versions and tile size may differ.
         fresh: move an existing folder aside.
 
     Raises:
-        InputError: for a damaged folder, another chart, or a folder that another process writes; if the disk is full.
+        InputError: for a damaged folder, a folder with another chart or one that another process writes; if the disk
+            is full.
     """
     lock = FileLock(path / _LOCK, timeout=0)
     with _refuse_write_errors(path):
@@ -110,22 +111,22 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
             with lock:
                 move_aside(path)
         if not path.exists():
-            each = sum(np.dtype(layer["dtype"]).itemsize for layer in about["layers"].values())
-            needed, free = each * grid.size, shutil.disk_usage(path.parent).free
+            bytes_per_design = sum(np.dtype(layer["dtype"]).itemsize for layer in about["layers"].values())
+            needed, free = bytes_per_design * grid.size, shutil.disk_usage(path.parent).free
             if needed > free:
                 raise OSError(errno.ENOSPC, f"takes {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free")
             path.mkdir()
         elif not any((path / n).exists() for n in (_ABOUT, _LOCK)):
             raise _make_no_chart_error(path)
-        held = lock.acquire()
-    with held:
+        held_lock = lock.acquire()
+    with held_lock:
         if not os.path.lexists(path / _ABOUT):
             with _refuse_write_errors(path):
                 _create(path, about, grid)
         existing, _, tiles = read_folder(path)
         ignored = {"versions": None, "tile": None}
-        if changed := list(list_differences(existing | ignored, about | ignored)):
-            message = f"holds another chart ({'; '.join(changed)}); give another name, or --fresh to move it aside"
+        if differences := list(list_differences(existing | ignored, about | ignored)):
+            message = f"holds another chart ({'; '.join(differences)}); give another name, or --fresh to move it aside"
             raise input_error(message, str(path))
         try:
             yield tiles
@@ -153,7 +154,7 @@ def _make_no_chart_error(path: Path) -> InputError:
 
 
 def _create(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
-    """Create the files of a new chart, about.json last: without it the next run starts anew."""
+    """Create the files of a new chart. The last one is about.json: without it, the next run starts again."""
     for part in ("axes", "layers"):
         shutil.rmtree(path / part, ignore_errors=True)  # left by a killed process
         (path / part).mkdir()
@@ -171,7 +172,7 @@ def _create(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
 class _Axis(BaseModel):
     min: FiniteFloat
     max: FiniteFloat
-    points: Annotated[int, Field(ge=2, le=LONGEST)]
+    points: Annotated[int, Field(ge=2, le=MAX_AXIS_POINTS)]
 
 
 class _Problem(BaseModel):
@@ -199,7 +200,7 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
     """Read and validate a folder: its description, its problem (None if it does not hold the model), its layers.
 
     Raises:
-        InputError: if it is no folder of a chart, or a damaged one.
+        InputError: if it is not the folder of a chart, or is damaged.
     """
     if not (path / _ABOUT).exists():
         raise _make_no_chart_error(path)
@@ -208,22 +209,22 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
         about = from_json(read_text(str(_find_file(path, name)), "JSON file", _LONG_ABOUT), _LONG_ABOUT)
         _About.model_validate(about, strict=True)
         problem, grid, layers = _state_problem(about), grid_of(about), {}
-        if grid.size > MOST:
-            raise ValueError(f"more than {MOST:.0e} designs")
-        for layer, stated in about["layers"].items():
+        if grid.size > MAX_DESIGNS:
+            raise ValueError(f"more than {MAX_DESIGNS:.0e} designs")
+        for layer, description in about["layers"].items():
             name = _layer_path(layer)
             layers[layer] = array = np.lib.format.open_memmap(_find_file(path, name), "r")
-            if array.shape != grid.shape or array.dtype.str != stated.get("dtype") or not array.flags.c_contiguous:
-                raise ValueError(f"not an array of shape {grid.shape} and type {stated.get('dtype')}")
+            if array.shape != grid.shape or array.dtype.str != description.get("dtype") or not array.flags.c_contiguous:
+                raise ValueError(f"not an array of shape {grid.shape} and type {description.get('dtype')}")
         name = _TILES
         record = _find_file(path, name)
-        done, end = _read_record(record, about["tile"], grid)
-    except Exception as error:  # a damaged folder can raise anything, such as a link to itself a RuntimeError
+        tallies, end = _read_record(record, about["tile"], grid)
+    except Exception as error:  # a damaged folder can raise any error; a link to itself raises a RuntimeError
         reason = " ".join(str(error).split())[:300]
         raise input_error(
             f"'{path}' is damaged: {name}: {reason}; give --fresh to move it aside and start anew"
         ) from None
-    return about, problem, Tiles(layers, about["tile"], done, record, end)
+    return about, problem, Tiles(layers, about["tile"], tallies, record, end)
 
 
 def grid_of(about: Mapping[str, Any]) -> Grid:
@@ -233,16 +234,16 @@ def grid_of(about: Mapping[str, Any]) -> Grid:
 
 
 def _state_problem(about: Mapping[str, Any]) -> Problem | None:
-    """The problem without equality constraints; None for a model of the user."""
-    stated = about["problem"]
-    if "statement" in stated or stated["model"] not in MODELS:
+    """The problem without equality constraints; None for a model that the user defined."""
+    statement = about["problem"]
+    if "statement" in statement or statement["model"] not in MODELS:
         return None
     free = {n: (axis["min"], axis["max"]) for n, axis in about["axes"].items()}
-    return Problem(MODELS[stated["model"]], stated["fixed"], free, stated["constraints"], title=about["title"])
+    return Problem(MODELS[statement["model"]], statement["fixed"], free, statement["constraints"], title=about["title"])
 
 
 def _find_file(path: Path, name: str) -> Path:
-    """Path of a regular file in the folder; refuses links, so that nothing outside is written."""
+    """Path of a regular file in the folder; links are refused, so that nothing outside of the folder is written."""
     place = path.resolve() / name
     if place.resolve() != place or not place.is_file():
         raise ValueError("no file, or a link")
@@ -250,10 +251,14 @@ def _find_file(path: Path, name: str) -> Path:
 
 
 def _read_record(place: Path, tile: int, grid: Grid) -> tuple[dict[int, Tally], int]:
-    """First row → counts of each recorded tile; and where the last whole line ends."""
-    done, end = dict[int, Tally](), 0
+    """Read the record of tiles.
+
+    Returns:
+        First row → counts of each recorded tile, and the position after the last complete line.
+    """
+    tallies, end = dict[int, Tally](), 0
     tiles = {rows.start: rows for rows in grid.tiles(tile)}
-    for line in read_lines(str(place), "JSON record", MOST_TILES * _LONG_LINE, _LONG_LINE):
+    for line in read_lines(str(place), "JSON record", MAX_TILES * _LONG_LINE, _LONG_LINE):
         if not line.endswith("\n"):
             break  # cut off while it was written
         end += len(line)
@@ -261,5 +266,5 @@ def _read_record(place: Path, tile: int, grid: Grid) -> tuple[dict[int, Tally], 
         row, counts = entry["row"], _TALLY.validate_python(entry)
         if counts.designs != len(tiles.get(row, ())) * grid.shape[-1] or not -1 <= counts.place < grid.size:
             raise ValueError(f"{line:.100} is no tile")
-        done[row] = counts
-    return done, end
+        tallies[row] = counts
+    return tallies, end

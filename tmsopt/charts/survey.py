@@ -1,4 +1,4 @@
-"""Grids over two or three parameters; what is computed for their designs, a few rows at a time, and counted."""
+"""Grids over two or three parameters, and surveys, which compute layers for their designs a few rows at a time."""
 
 import math
 import operator
@@ -27,31 +27,31 @@ LAYERS: Mapping[str, DTypeLike] = {
     "satisfied": np.bool_,
     "margin": np.float64,
 }
-"""Layers that a chart can have, with their types; see `Chart`."""
+"""Layers that a chart can have → their types; `Chart` explains them."""
 
 USUAL = tuple(LAYERS)[:-1]
 """Default layers of a chart in a folder."""
 
 USUAL_POINTS: Mapping[int, tuple[int, ...]] = {2: (400, 300), 3: (120, 100, 80)}
-"""Default points along two or three axes."""
+"""Number of axes → default numbers of points along them."""
 
-MOST = 10**9
-"""Most designs of a grid."""
+MAX_DESIGNS = 10**9
+"""Largest number of designs of a grid."""
 
-LONGEST = 10**6
-"""Most points along one axis."""
+MAX_AXIS_POINTS = 10**6
+"""Largest number of points along one axis."""
 
-MOST_TILES = 10**6
-"""Most tiles of a chart."""
+MAX_TILES = 10**6
+"""Largest number of tiles of a chart."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Values along two or three axes; arrays have the last axis first, as an image has.
+    """Values along two or three axes. The first index of an array belongs to the last axis, as in an image.
 
     Attributes:
         axes: names of the parameters.
-        values: along each axis.
+        values: values along each axis.
     """
 
     axes: tuple[str, ...]
@@ -68,13 +68,13 @@ class Grid:
         return math.prod(self.shape)
 
     def columns(self, rows: range) -> dict[str, Array]:
-        """Parameters of a few rows: the first axis in shape (1, n), the others in shape (len(rows), 1)."""
-        places = np.unravel_index(np.arange(rows.start, rows.stop), self.shape[:-1])
-        others = zip(self.axes[:0:-1], self.values[:0:-1], places, strict=True)
-        return {self.axes[0]: self.values[0][None, :]} | {n: values[at][:, None] for n, values, at in others}
+        """Parameters of a few rows: that of the first axis has shape (1, n), the others have shape (len(rows), 1)."""
+        indices = np.unravel_index(np.arange(rows.start, rows.stop), self.shape[:-1])
+        slow_axes = zip(self.axes[:0:-1], self.values[:0:-1], indices, strict=True)
+        return {self.axes[0]: self.values[0][None, :]} | {n: values[index][:, None] for n, values, index in slow_axes}
 
     def describe(self) -> dict[str, dict[str, Any]]:
-        """Axis → its ends and number of points."""
+        """Axis → its ends and its number of points."""
         axes = zip(self.axes, self.values, strict=True)
         return {n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)} for n, v in axes}
 
@@ -89,12 +89,12 @@ class Grid:
         Raises:
             InputError: for too many tiles.
         """
-        each, rows = max(1, points // self.shape[-1]), range(self.size // self.shape[-1])
-        if (count := len(rows[::each])) > MOST_TILES:
+        rows_per_tile, rows = max(1, points // self.shape[-1]), range(self.size // self.shape[-1])
+        if (count := len(rows[::rows_per_tile])) > MAX_TILES:
             raise input_error(
-                f"found {points}, which makes {count} tiles; accepted: {MOST_TILES} tiles or fewer", "tile"
+                f"found {points}, which makes {count} tiles; accepted: {MAX_TILES} tiles or fewer", "tile"
             )
-        return [rows[k : k + each] for k in rows[::each]]
+        return [rows[k : k + rows_per_tile] for k in rows[::rows_per_tile]]
 
 
 @dataclass(frozen=True)
@@ -103,11 +103,11 @@ class Tally:
 
     Attributes:
         designs: number of designs.
-        classes: number in each class; empty without the layer ``kind``.
-        satisfied: number that satisfy every inequality; None without that layer.
-        least: least abscissa of these; nan if there is none.
-        place: its index in the flat arrays, the first of equals; -1 if there is none.
-        fallbacks: number of designs whose roots came from companion eigenvalues.
+        classes: number of designs in each class; empty without the layer ``kind``.
+        satisfied: number of designs that satisfy every inequality; None without that layer.
+        least: least abscissa of the designs that satisfy every inequality; nan if there is none.
+        place: index of that least abscissa in the flat arrays, the first index if it occurs again; -1 if there is none.
+        fallbacks: number of designs whose roots were computed as eigenvalues of a companion matrix.
     """
 
     designs: int = 0
@@ -130,38 +130,39 @@ class Survey:
     Attributes:
         dtypes: layer → its type, for names among `LAYERS` and for quantities.
         quantities: name → expression of an additional layer.
-        before, after: functions computed before the roots, including the coefficients, and those that need roots.
+        formulas: functions that need no roots, including the coefficients.
+        root_formulas: functions that need the roots.
     """
 
     problem: Posed
     grid: Grid
     dtypes: Mapping[str, np.dtype[Any]]
     quantities: Mapping[str, str]
-    before: ArrayFunction = field(repr=False)
-    after: ArrayFunction = field(repr=False)
+    formulas: ArrayFunction = field(repr=False)
+    root_formulas: ArrayFunction = field(repr=False)
 
     def compute(self, rows: range) -> tuple[dict[str, NDArray[Any]], Tally]:
-        """The layers of a few rows, shape (len(rows), n), and their counts."""
+        """The layers of a few rows, of shape (len(rows), n), and their counts."""
         shape, layers, fallbacks = (len(rows), self.grid.shape[-1]), self.dtypes.keys(), 0
         columns, model = {**self.problem.fixed, **self.grid.columns(rows)}, self.problem.model
         with np.errstate(all="ignore"):  # overflow counts as undefined
-            values = self.before(columns)
+            values = self.formulas(columns)
             coefficients = [np.broadcast_to(values[n], shape) for n in model.coefficient_names()]
             if {"kind", "real_roots"} & layers:
                 values |= vars(classify(coefficients))
-            if self.after.names or {"abscissa", "damping_ratio"} & layers:
+            if self.root_formulas.names or {"abscissa", "damping_ratio"} & layers:
                 motion = find_motion(coefficients)
                 fallbacks = motion.fallbacks
                 ratio = motion.damping_ratio if model.carrier is None else np.full(shape, np.nan)
-                found = {"abscissa": motion.abscissa, "damping_ratio": ratio}
-                values |= found | self.after(columns | found)
+                root_quantities = {"abscissa": motion.abscissa, "damping_ratio": ratio}
+                values |= root_quantities | self.root_formulas(columns | root_quantities)
             if {"satisfied", "margin"} & layers:
                 sides = [-c.sign * values[_LIMIT + n] for n, c in limits_of(self.problem).items()]
                 values["margin"] = reduce(np.minimum, sides, np.inf)
                 values["satisfied"] = values["margin"] >= 0
             values |= {n: values[_QUANTITY + n] for n in self.quantities}
-            whole = {n: np.broadcast_to(values[n], shape) for n in layers}
-            arrays = {n: np.ascontiguousarray(whole[n], dtype) for n, dtype in self.dtypes.items()}
+            full_arrays = {n: np.broadcast_to(values[n], shape) for n in layers}
+            arrays = {n: np.ascontiguousarray(full_arrays[n], dtype) for n, dtype in self.dtypes.items()}
         return arrays, count_tile(arrays, rows.start * shape[1], fallbacks)
 
 
@@ -186,38 +187,40 @@ def plan_survey(
 
     Raises:
         InputError: unless two or three parameters are free and the axes name them; for bad numbers of points, unknown
-            layers, bad expressions.
+            layers or bad expressions.
     """
     problem = pose(problem)
     names = axes_of(problem, axes)
     sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
-    extra = {} if quantities is None else quantities
-    faults = layer_faults(layers, LAYERS) + table_faults("quantities", extra, "{'wheel_load': 'load_front/2'}")
+    user_layers = {} if quantities is None else quantities
+    faults = layer_faults(layers, list(LAYERS)) + table_faults(
+        "quantities", user_layers, "{'wheel_load': 'load_front/2'}"
+    )
     if not faults:
         reserved = {*LAYERS, *names, "about"}
         message = f"accepted: letters, digits and _, other than {' '.join(sorted(reserved))}"
-        wrong = [n for n in extra if n in reserved or not (n.isidentifier() and n.isascii())]
-        faults = [Fault(f"found the name {n!r}; {message}", ("quantities",)) for n in wrong]
-        if not (layers or extra):
+        bad_names = [n for n in user_layers if n in reserved or not (n.isidentifier() and n.isascii())]
+        faults = [Fault(f"found the name {n!r}; {message}", ("quantities",)) for n in bad_names]
+        if not (layers or user_layers):
             faults.append(Fault(f"found none; accepted: some of {' '.join(LAYERS)}", ("layers",)))
     if faults:
         raise InputError(faults)
-    wanted = {_QUANTITY + n: e for n, e in parse_all(problem, extra).items()}
+    expressions = {_QUANTITY + n: e for n, e in parse_all(problem, user_layers).items()}
     message = f"found {RADIUS}, which needs a search for every design; accepted: quantities with a formula"
-    if faults := [Fault(message, ("quantities", n)) for n in extra if RADIUS in wanted[_QUANTITY + n].names]:
+    if faults := [Fault(message, ("quantities", n)) for n in user_layers if RADIUS in expressions[_QUANTITY + n].names]:
         raise InputError(faults)
     if {"satisfied", "margin"} & set(layers):
-        wanted |= {_LIMIT + n: c for n, c in limits_of(problem).items()}
-    wanted |= parse_all(problem, {n: n for n in problem.model.coefficient_names()})
-    on_roots = {n: e for n, e in wanted.items() if set(ROOT_NAMES) & set(e.names)}
-    types = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *extra)}
+        expressions |= {_LIMIT + n: c for n, c in limits_of(problem).items()}
+    expressions |= parse_all(problem, {n: n for n in problem.model.coefficient_names()})
+    root_expressions = {n: e for n, e in expressions.items() if set(ROOT_NAMES) & set(e.names)}
+    types = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *user_layers)}
     return Survey(
         problem,
         Grid(names, tuple(np.linspace(*problem.free[n], m) for n, m in zip(names, sizes, strict=True))),
         {n: np.dtype(np.float32) if single and d == np.float64 else d for n, d in types.items()},
-        dict(extra),
-        before=array_function(problem, {n: e for n, e in wanted.items() if n not in on_roots}),
-        after=array_function(problem, on_roots),
+        dict(user_layers),
+        formulas=array_function(problem, {n: e for n, e in expressions.items() if n not in root_expressions}),
+        root_formulas=array_function(problem, root_expressions),
     )
 
 
@@ -238,8 +241,8 @@ def axes_of(problem: Posed, axes: Sequence[str] | None = None) -> tuple[str, ...
     if len(free) not in (2, 3):
         message = f"a grid needs two or three free parameters, and {len(free)} are free ({', '.join(free) or 'none'})"
         fixed = [n for n in ("Fr", "v", *problem.fixed) if n in problem.fixed]
-        freed = f"; write e.g. {example_of(problem.parameter_set[fixed[0]])[1]}" if fixed else ""
-        raise input_error(message + ("; fix the others" if len(free) > 3 else freed), "parameters")
+        advice = f"; write e.g. {example_of(problem.parameter_set[fixed[0]])[1]}" if fixed else ""
+        raise input_error(message + ("; fix the others" if len(free) > 3 else advice), "parameters")
     if axes is not None and (list_faults("axes", axes, "") or sorted(map(str, axes)) != sorted(free)):
         raise input_error(f"found {axes!r}; accepted: {' and '.join(free)}", "axes")
     return tuple(axes or free)
@@ -250,15 +253,17 @@ def _sizes(points: Any, count: int) -> tuple[int, ...]:
         sizes = tuple(map(operator.index, points))
     except (TypeError, ValueError):
         sizes = ()
-    if len(sizes) != count or min(sizes) < 2 or max(sizes) > LONGEST or math.prod(sizes) > MOST:
+    if len(sizes) != count or min(sizes) < 2 or max(sizes) > MAX_AXIS_POINTS or math.prod(sizes) > MAX_DESIGNS:
         number = ("two", "three")[count - 2]
-        accepted = f"{number} whole numbers, each from 2 to {LONGEST}, with a product of {MOST:.0e} or less"
+        accepted = (
+            f"{number} whole numbers, each from 2 to {MAX_AXIS_POINTS}, with a product of {MAX_DESIGNS:.0e} or less"
+        )
         raise input_error(f"found {points!r}; accepted: {accepted}", "points")
     return sizes
 
 
 def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 0) -> Tally:
-    """Count over a tile whose first design has the index `first`."""
+    """Count over a tile; its first design has the index `first` in the flat arrays of the chart."""
     kind, satisfied, abscissa = (layers.get(n) for n in ("kind", "satisfied", "abscissa"))
     least, place = math.nan, -1
     if abscissa is not None:
@@ -278,14 +283,14 @@ def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 
 
 def add_tallies(tallies: Iterable[Tally]) -> Tally:
     """Add the counts of several tiles, in any order."""
-    every = [*tallies]
-    best = min((t for t in every if t.place >= 0), key=lambda t: (t.least, t.place), default=Tally())
-    satisfied = [t.satisfied for t in every if t.satisfied is not None]
+    tally_list = [*tallies]
+    best = min((t for t in tally_list if t.place >= 0), key=lambda t: (t.least, t.place), default=Tally())
+    satisfied = [t.satisfied for t in tally_list if t.satisfied is not None]
     return Tally(
-        sum(t.designs for t in every),
-        tuple(map(sum, zip(*(t.classes for t in every), strict=True))),
+        sum(t.designs for t in tally_list),
+        tuple(map(sum, zip(*(t.classes for t in tally_list), strict=True))),
         sum(satisfied) if satisfied else None,
         best.least,
         best.place,
-        sum(t.fallbacks for t in every),
+        sum(t.fallbacks for t in tally_list),
     )

@@ -1,6 +1,6 @@
-"""Pareto: fronts of two or three objectives.
+"""Pareto fronts of two or three objectives.
 
-In: a problem with `pareto`. Out: a `Front` of designs, none of which dominates another. Open `pareto` first.
+Input: a problem with `pareto`. Result: a `Front` of designs, none of which dominates another. Read `pareto` first.
 """
 
 import lazy_loader

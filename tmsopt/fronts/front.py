@@ -16,12 +16,12 @@ from tmsopt.records import Tabular, plain
 
 @dataclass(frozen=True)
 class FrontPoint:
-    """An efficient design: no design found improves one objective without loss in another.
+    """An efficient design: no other design that was found improves one objective without a loss in another.
 
     Attributes:
         objectives: values of the objectives, in the order of the problem.
         solution: the rechecked design; its problem minimises one objective with limits on the others.
-        limits: names of the active constraints and bounds of the user.
+        limits: names of the user's active constraints and bounds.
         label: what is special about the point, e.g. ``least Fr``, ``EP3 -> pair+real``; empty for most.
     """
 
@@ -43,8 +43,8 @@ class FrontPoint:
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; missing numbers are None."""
         solution = plain(self.solution, "parameters abscissa abscissa_realised stable structure")
-        lost = {"missed_as_stored": plain(self.solution.missed)} if self.solution.missed else {}
-        return plain(self, "objectives") | solution | lost | plain(self, "limits label")
+        missed = {"missed_as_stored": plain(self.solution.missed)} if self.solution.missed else {}
+        return plain(self, "objectives") | solution | missed | plain(self, "limits label")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Kink:
     Attributes:
         name: e.g. ``EP3 -> pair+real``, ``lambda_s.min begins to bind``.
         index: index of the last point before the change.
-        width: of the interval that holds the change, in ranges of the objectives.
+        width: width of the interval that holds the change, in ranges of the objectives.
     """
 
     name: str
@@ -84,8 +84,9 @@ class Front(Tabular):
     Attributes:
         objectives: the expressions, each minimised.
         points: sorted by the first objective, best first; none dominates another.
-        kinks, gaps: for two objectives; with three, gaps are sub-problems that failed.
-        ideal, nadir: least and greatest value of each objective over the points.
+        kinks: changes along the front; only for two objectives.
+        gaps: stretches without points; for three objectives, sub-problems that failed.
+        ideal, nadir: smallest and largest value of each objective over the points.
         solved: number of sub-problems solved.
         notes: sentences for the reader.
         interrupted: whether the user stopped the search; the front then holds the points found.
@@ -115,12 +116,12 @@ class Front(Tabular):
 
     @property
     def ideal(self) -> tuple[float, ...]:
-        """Least value of each objective."""
+        """Smallest value of each objective."""
         return tuple(map(min, zip(*(p.objectives for p in self.points), strict=True)))
 
     @property
     def nadir(self) -> tuple[float, ...]:
-        """Greatest value of each objective on the front."""
+        """Largest value of each objective on the front."""
         return tuple(map(max, zip(*(p.objectives for p in self.points), strict=True)))
 
     def records(self) -> Iterable[dict[str, Any]]:
@@ -168,14 +169,14 @@ def efficient_points(points: Sequence[FrontPoint], slack: Sequence[float]) -> li
     """The points that no other point dominates, sorted by their objectives; equal points are kept once.
 
     Args:
-        slack: per objective, the difference that rounding explains.
+        slack: largest difference of each objective that rounding explains.
     """
     values, allowed = np.array([p.objectives for p in points]), np.asarray(slack)
-    kept: list[int] = []
-    for k, own in enumerate(values):
-        excess = values - own
+    kept_indices: list[int] = []
+    for k, objectives in enumerate(values):
+        excess = values - objectives
         dominated = (excess <= allowed).all(axis=1) & (excess < -allowed).any(axis=1)
-        if not dominated.any() and not (np.abs(excess[kept]) <= allowed).all(axis=1).any():
-            kept.append(k)
-    chosen = (points[k] for k in kept)
+        if not dominated.any() and not (np.abs(excess[kept_indices]) <= allowed).all(axis=1).any():
+            kept_indices.append(k)
+    chosen = (points[k] for k in kept_indices)
     return sorted(chosen, key=lambda p: [float(f"{x:.9g}") for x in p.objectives])  # rounding decides no tie

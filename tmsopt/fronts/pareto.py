@@ -1,4 +1,4 @@
-"""Pareto fronts by eps-constraints, warm-started along the front."""
+"""Pareto fronts by eps-constraints (one objective minimised, limits eps on the others), started from nearby designs."""
 
 import time
 from dataclasses import replace
@@ -32,7 +32,7 @@ STARTS = 2
 """New starts per sub-problem, in addition to the neighbours' designs."""
 
 _DEFAULTS = Options(starts=STARTS)
-_NO_CONFLICT = 1e-7  # relative difference of the ends up to which objectives do not conflict, as for equal optima
+_NO_CONFLICT = 1e-7  # objectives do not conflict if their relative difference between the ends is at most this
 
 
 @documents_options(CommonOptions, _DEFAULTS)
@@ -41,24 +41,24 @@ def pareto(
 ) -> Front:
     """Compute the Pareto front of two or three objectives, each minimised, with its ends, kinks and gaps.
 
-    With two objectives, each sub-problem minimises one subject to the other ≤ eps. The next eps lies where neighbours
-    are farthest apart, on the objective that changes more; sweeps in both directions then keep the better design. With
-    three, eps runs over a grid on the payoff table, points × points but at most 12 × 12. Gaps narrower than the
-    spacing of the points may be missed. Ctrl-C keeps the points found, once one end is known.
+    With two objectives, each sub-problem minimises one and limits the other by eps. The next eps lies between the
+    neighbours that are farthest apart, on the objective that changes more there; sweeps in both directions then keep
+    the better design. With three objectives, the limits on two of them form a grid of points × points values, at most
+    12 × 12, over their ranges at the ends of the front. Gaps narrower than the spacing of the points may be missed.
+    After Ctrl-C the points found are returned, if one end is known.
 
     Args:
-        problem: a problem with ``pareto``; ``locate`` and constraints narrow the designs.
+        problem: a problem with ``pareto``; ``locate`` and constraints restrict the designs.
         points: number of points along the front; kinks and ends of gaps are added. With three objectives, number of
-            limits on each of the last two, at most 12: the front has about the square of that in points, fewer if
-            limits follow from one another or cannot be met.
-        workers: number of processes, by default one per core; at most four are used. The front is the same for any
-            number.
+            limits on each of the last two, at most 12: the front has at most about the square of this number of
+            points, and fewer where different limits give the same design or cannot be met.
+        workers: number of processes, by default one per core; at most four are used. The front does not depend on it.
         options: ``starts`` (new starts per sub-problem, 2 by default), ``seed``, ``linear_solver`` and ``progress``,
             as for `solve`.
 
     Raises:
-        NotSolved: if an objective has no optimum; carries the best point found.
-        InputError: for a problem without ``pareto``, for fewer than 2 or more than 10000 points, or for no process.
+        NotSolved: if no optimum of an objective is found; the exception holds the best point found.
+        InputError: for a problem without ``pareto``, fewer than 2 or more than 10000 points, or less than one process.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # the abscissa is -c/2 up to c = 2
@@ -73,15 +73,15 @@ def pareto(
     if not problem.pareto:
         message = 'no front is asked for; add e.g. pareto = ["abscissa", "Fr"], or call tmsopt.solve'
         raise input_error(message, "objective")
-    how = make_options(options, defaults=_DEFAULTS, fewest=0)
+    choices = make_options(options, defaults=_DEFAULTS, fewest=0)
     faults = count_faults("points", points, 2, MOST_POINTS)
     if faults := faults + ([] if workers is None else count_faults("workers", workers, 1)):
         raise InputError(faults)
     began = time.perf_counter()
-    solver = FrontSolver(problem, replace(how, progress=None))
+    solver = FrontSolver(problem, replace(choices, progress=None))
     workers_used = min(workers or cores(), MAX_PARALLEL) if can_pickle(solver) else 1
     with processes(workers_used) if workers_used > 1 else here() as executor:
-        front = _front(executor, solver, points, how.progress or Steps(lambda _: None))
+        front = _front(executor, solver, points, choices.progress or Steps(lambda _: None))
     if front.interrupted:
         note = f"the user stopped the search after {front.solved} sub-problems; the front holds the points found so far"
         front = replace(front, notes=(*front.notes, note))
@@ -95,8 +95,8 @@ def _front(executor: Executor, solver: FrontSolver, points: int, progress: Steps
     progress(0, 2 * n)
     front = Front(solver.problem.problem, solver.texts, (), (), (), n, 0.0)
     try:
-        for k, found in map_items(executor, minimise_alone, solver, range(n)):
-            single_optima[k] = found
+        for k, optimum in map_items(executor, minimise_alone, solver, range(n)):
+            single_optima[k] = optimum
             progress(len(single_optima), 2 * n)
             for solution in (single_optima[j] for j in takewhile(single_optima.__contains__, range(n))):
                 if solution.status != "optimal":
@@ -109,20 +109,20 @@ def _front(executor: Executor, solver: FrontSolver, points: int, progress: Steps
         if not ends:
             raise
         return replace(front, points=tuple(ends.values()), solved=n + len(ends), interrupted=True)
-    reached = tuple(ends[k] for k in range(n))
-    values = np.array([p.objectives for p in reached])
+    end_points = tuple(ends[k] for k in range(n))
+    values = np.array([p.objectives for p in end_points])
     ranges = np.ptp(values, axis=0)
     conflict = ranges > _NO_CONFLICT * (1 + np.abs(values).max(axis=0))
-    solver = replace(solver, ranges=tuple(ranges.tolist()), ends=reached)
+    solver = replace(solver, ranges=tuple(ranges.tolist()), ends=end_points)
     if not (conflict.all() if n == 2 else conflict.any()):
-        best_in_all = min(reached, key=lambda p: sum(p.objectives))
+        best_in_all = min(end_points, key=lambda p: sum(p.objectives))
         note = "the objectives do not conflict: one design is best in all of them, and the front is that point"
         return replace(front, points=(replace(best_in_all, label="best in all"),), notes=(note,))
     return (fill_curve if n == 2 else fill_surface)(executor, solver, front, points, progress)
 
 
 def _label(text: str) -> str:
-    """The label of the end at which an objective is best."""
+    """The label of the end of the front at which an objective is best."""
     opposite = text.removeprefix("-").strip()
     greatest = text != opposite and opposite.isidentifier()
     return f"greatest {opposite}" if greatest else f"least {text}"

@@ -1,7 +1,8 @@
 """Results as figures, drawn with Matplotlib.
 
-In: results of any verb. Out: Axes, each `draw_…` on those given or in a figure of its own; figures, saved whole or not
-at all. Open `growth` first; `paper` has the figures of the source.
+Input: a result of `tmsopt`. Each `draw_…` draws it on given Axes or in a new figure, and returns the Axes; each
+`…_figure` returns a figure. `save` writes a complete file or none. Read `growth` first; `paper` has the figures of the
+paper.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""Stability charts drawn with their exact boundary curves."""
+"""Draw stability charts with their exact boundary curves."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -21,7 +21,7 @@ from tmsopt.charts.chart import Chart
 from tmsopt.errors import input_error, suggest
 from tmsopt.models import Model, in_words_of, tms
 from tmsopt.plots.labels import Name, PlaneAxes, abscissa_label, events_of, finish_axes, plane_over
-from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, figure_of, on_axes
+from tmsopt.plots.style import CAPSIZE, CRITICAL, LINE, MARK, ensure_axes, figure_of
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.records import Array
@@ -30,32 +30,33 @@ from tmsopt.search.solve import solve
 from tmsopt.tracing.domain import Domain
 
 Legend = tuple[list[Name], list[Artist]]
-"""Names to place, and legend entries."""
+"""Names of points, which are written later, and legend entries."""
 
 CLASS_COLOURS = ("#FFFFFF", "#BBBBBB", "#E6E6E6", "#A6D5F0", "#F2C45A")
-"""Fills of the classes, undefined to heavily damped, told apart by lightness too."""
+"""Fill colours of the classes from undefined to heavily damped; their lightness differs too."""
 
-_BOUNDARIES = (
+_BOUNDARY_STYLES = (
     ("parting", "between capsize and weave", CAPSIZE, 1.2),
     ("stability", "edge of stability", CRITICAL, 1.8),
     ("heavy_damping", "edge of heavy damping", LINE, 1.4),
 )
-"""Boundaries of a domain, with words, colour and width, in the order in which they are drawn."""
+"""Boundaries of a domain in the order in which they are drawn: field, label, colour and line width."""
 
-_SHOWN = (1, 95)  # percentiles of a layer between which colours change: poles of the abscissa must not take them all
+_COLOUR_PERCENTILES = (1, 95)
+"""The colours cover a layer between these percentiles, so that poles of the abscissa do not take all of them."""
 
-_KINDS: Mapping[str, tuple[LineStyleType, str]] = {
+_ARC_STYLES: Mapping[str, tuple[LineStyleType, str]] = {
     "capsize": ("-.", " (root 0)"),
     "infinity": (":", " (root at infinity)"),
 }
-"""Line of an arc by its kind, and words for it; others are drawn through."""
+"""Kind of a boundary curve → line style and addition to its label; other kinds have a solid line."""
 
-_LAYERS = {"damping_ratio": "damping ratio", "real_roots": "number of real roots"}
-"""Words for layers of numbers; quantities have their own name."""
+_LAYER_LABELS = {"damping_ratio": "damping ratio", "real_roots": "number of real roots"}
+"""Labels of layers of numbers; a quantity is labelled with its name."""
 
 
 def draw_layer(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> Legend:
-    """A layer as colours, exact boundaries on top, hatched where a constraint is violated; names and legend entries."""
+    """Draw a layer as colours, with the exact boundaries, and hatching where a constraint is violated."""
     model, handles = chart.problem.model, list[Artist]()
     if layer == "kind":
         handles += class_handles(chart.kind, model)
@@ -67,8 +68,8 @@ def draw_layer(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> Legend:
 
 
 def _fill(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str, **look: Any) -> QuadMesh:
-    """A layer as colours, in a plane with its symbols and units, with limits at the ends of the grid."""
-    x, y = grid = _grid(chart, plane)
+    """Draw a layer as colours; label the axes and limit them to the grid."""
+    x, y = grid = _axis_values(chart, plane)
     plane.label(ax)
     ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     return ax.pcolormesh(*grid, chart.layers[layer], rasterized=True, **look)
@@ -76,8 +77,8 @@ def _fill(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str, **look: Any) -> 
 
 def class_handles(kind: NDArray[np.int8], model: Model) -> list[Patch]:
     """Legend entries of the classes that occur."""
-    how = "unstable by" if model.carrier is None else "gain, beyond"
-    words = {kind: f"{how} {word}" for kind, word in events_of(model).items()}
+    prefix = "unstable by" if model.carrier is None else "gain, beyond"
+    words = {kind: f"{prefix} {word}" for kind, word in events_of(model).items()}
     return [
         Patch(facecolor=CLASS_COLOURS[code], edgecolor="grey", label=words.get(CLASSES[code], CLASSES[code]))
         for code in np.unique(kind)
@@ -85,20 +86,20 @@ def class_handles(kind: NDArray[np.int8], model: Model) -> list[Patch]:
 
 
 def domain_curves(ax: Axes, domain: Domain | None, plane: PlaneAxes, model: Model = tms) -> Legend:
-    """Boundaries of stability and of heavy damping as curves, their corners marked; names to place, legend entries.
+    """Draw the boundaries of stability and of heavy damping as curves, and mark their corners.
 
     Args:
-        model: in whose words.
+        model: its words are used for the corners.
     """
     names, handles = list[Name](), list[Artist]()
     if domain is None:
         return names, handles
-    for name, words, colour, width in _BOUNDARIES:
-        around = withStroke(linewidth=width + 1.2, foreground="white", alpha=0.6)
+    for name, words, colour, width in _BOUNDARY_STYLES:
+        outline = withStroke(linewidth=width + 1.2, foreground="white", alpha=0.6)
         for arc in getattr(domain, name):
-            style, how = _KINDS.get(arc.kind, ("-", ""))
-            look: dict[str, Any] = {"color": colour, "linestyle": style, "linewidth": width, "label": words + how}
-            handles += ax.plot(*plane.to_axis(arc.points), path_effects=[around], **look)
+            style, suffix = _ARC_STYLES.get(arc.kind, ("-", ""))
+            look: dict[str, Any] = {"color": colour, "linestyle": style, "linewidth": width, "label": words + suffix}
+            handles += ax.plot(*plane.to_axis(arc.points), path_effects=[outline], **look)
     for corner in domain.corners:
         x, y = plane.to_axis(corner.parameters)
         ax.plot(x, y, "o", color=MARK, markersize=4, zorder=5)
@@ -125,10 +126,10 @@ def draw_domain(
     vertical: str | None = None,
     problem: Problem | None = None,
 ) -> Axes:
-    """Boundaries of stability and of heavy damping, with their corners.
+    """Draw the boundaries of stability and of heavy damping, with their corners.
 
-    The Axes show a plane of two parameters, by default the first two that vary along the boundaries; in the units of a
-    problem where one is given, else in SI and rad.
+    The Axes show a plane of two parameters, by default the first two that vary along the boundaries. The units are
+    those of the problem if one is given, otherwise SI and rad.
 
     Example:
         >>> axes = tmsopt.plots.draw_domain(tmsopt.domain("problems/chart.toml"))
@@ -138,9 +139,9 @@ def draw_domain(
     More: docs/how_to/charts.md
     """
     arcs = (*data.stability, *data.heavy_damping, *data.parting)
-    varying = [n for n in (arcs[0].points if arcs else ()) if any(np.ptp(a.points[n]) > 0 for a in arcs)]
-    plane = plane_over(problem.posed if problem else None, horizontal, vertical, *varying)
-    ax = on_axes(ax, 6.4, 5.0, problem.title if problem else "")
+    varying_names = [n for n in (arcs[0].points if arcs else ()) if any(np.ptp(a.points[n]) > 0 for a in arcs)]
+    plane = plane_over(problem.posed if problem else None, horizontal, vertical, *varying_names)
+    ax = ensure_axes(ax, 6.4, 5.0, problem.title if problem else "")
     plane.label(ax)
     return finish_axes(ax, *domain_curves(ax, data, plane, problem.model if problem else tms))
 
@@ -173,19 +174,19 @@ def draw_chart(
     plane = plane_of(data)
     if layer not in data.layers:
         raise input_error(f"found '{layer}'; {suggest(layer, data.layers)}", "layer")
-    ax = on_axes(ax, 6.4, 5.4, data.problem.title)
+    ax = ensure_axes(ax, 6.4, 5.4, data.problem.title)
     names, handles = draw_layer(ax, data, plane, layer)
     if layer == "abscissa" and optimum:
-        handles += _optimum(ax, data, plane)
+        handles += _draw_optimum(ax, data, plane)
     if design is not None:
-        x, y = at = plane.to_axis(design.parameters)
-        handles += _mark(ax, at, "D", f"the design ({design.structure})")
+        x, y = place = plane.to_axis(design.parameters)
+        handles += _draw_mark(ax, place, "D", f"the design ({design.structure})")
         names.append(Name("design", x, y))
     return finish_axes(ax, names, handles)
 
 
 def chart_figure(chart: Chart, layer: str = "kind", design: Solution | None = None) -> Figure:
-    """A chart in a figure of its own.
+    """Draw a chart in a new figure.
 
     Example:
         >>> figure = tmsopt.plots.chart_figure(tmsopt.chart("problems/chart.toml", points=(20, 20)))
@@ -197,66 +198,70 @@ def chart_figure(chart: Chart, layer: str = "kind", design: Solution | None = No
     return figure_of(draw_chart(chart, None, layer, design))
 
 
-def _grid(chart: Chart, plane: PlaneAxes) -> list[Array]:
-    """Values along both axes, as they stand there."""
+def _axis_values(chart: Chart, plane: PlaneAxes) -> list[Array]:
+    """Values along both axes in the units of the axes."""
     return [scale.to_axis(values) for scale, values in zip(plane, chart.grid, strict=True)]
 
 
 def _hatch_violations(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Artist]:
-    """Hatching where a constraint does not hold, and a line where it just does; its legend entry."""
+    """Hatch the area where a constraint is violated, and draw its edge; return the legend entry."""
     if "satisfied" not in chart.layers or chart.satisfied.all():
         return []
-    grid = _grid(chart, plane)
-    hatched = ax.contourf(*grid, ~chart.satisfied, levels=[0.5, 1.5], colors="none", hatches=["//"])
-    hatched.set(edgecolor=(0.4, 0.4, 0.4, 0.7), linewidth=0)
+    grid = _axis_values(chart, plane)
+    hatching = ax.contourf(*grid, ~chart.satisfied, levels=[0.5, 1.5], colors="none", hatches=["//"])
+    hatching.set(edgecolor=(0.4, 0.4, 0.4, 0.7), linewidth=0)
     if "margin" in chart.layers and np.any(chart.margin > 0) and np.any(chart.margin < 0):
         ax.contour(*grid, chart.margin, levels=[0], colors="0.3", linewidths=0.8)
     return [Patch(facecolor="none", edgecolor="0.4", hatch="//", linewidth=0, label="constraint violated")]
 
 
 def _fill_numbers(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> None:
-    """The abscissa, damping ratio, number of real roots or a quantity, with its colour bar."""
-    bar: dict[str, Any] = {"label": _LAYERS.get(layer, layer), "extend": "both"}
+    """Draw the abscissa, damping ratio, number of real roots or a quantity, with its colour bar."""
+    bar: dict[str, Any] = {"label": _LAYER_LABELS.get(layer, layer), "extend": "both"}
     values = np.ma.masked_invalid(np.asarray(chart.layers[layer], dtype=float))
-    low, high = np.percentile(values.compressed(), _SHOWN) if values.count() else (0.0, 1.0)
+    low, high = np.percentile(values.compressed(), _COLOUR_PERCENTILES) if values.count() else (0.0, 1.0)
     look = {"cmap": "cividis", "vmin": low, "vmax": high}
     if layer == "real_roots":
         numbers = chart.problem.model.degree + 1
         look = {"cmap": colormaps["cividis"].resampled(numbers), "vmin": -0.5, "vmax": numbers - 0.5}
         bar |= {"ticks": range(numbers), "extend": "neither"}
     elif layer == "abscissa":
-        most = max(abs(low), abs(high)) or 1.0
-        look = {"cmap": "RdBu_r", "vmin": -most, "vmax": most}
+        limit = max(abs(low), abs(high)) or 1.0
+        look = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
         bar["label"] = abscissa_label(chart.problem.posed)
-        grid = _grid(chart, plane)
+        grid = _axis_values(chart, plane)
         levels = [x for x in MaxNLocator(9).tick_values(low, high) if low <= x <= high and x != 0]
-        drawn = ax.contour(*grid, values, levels=levels, colors="0.15", linewidths=0.6)
-        for text in ax.clabel(drawn, fontsize=6.5, fmt="%.3g"):
+        contours = ax.contour(*grid, values, levels=levels, colors="0.15", linewidths=0.6)
+        for text in ax.clabel(contours, fontsize=6.5, fmt="%.3g"):
             text.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
         if chart.domain is None:
             ax.contour(*grid, values, levels=[0.0], colors=LINE, linewidths=1.6)
     figure_of(ax).colorbar(_fill(ax, chart, plane, layer, **look), ax=ax, **bar)
 
 
-def _optimum(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Line2D]:
-    """The best design of the plane, solved for or of the grid: a star, and the legend says which."""
+def _draw_optimum(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Line2D]:
+    """Mark the best design with a star.
+
+    It is the optimum of the problem if there is one, otherwise the best grid point; the legend says which.
+    """
     problem = chart.problem.posed.nominal
-    of_H = problem.model.carrier is not None
+    is_complex = problem.model.carrier is not None
     if problem.objective is not None or problem.pattern is not None:
-        found = solve(problem, throw=False, interruptible=False)
-        if found.status == "optimal":
-            label = f"optimum ({found.structure}), {'largest Im ω' if of_H else 'abscissa'} {found.abscissa:.4g}"
-            return _mark(ax, plane.to_axis(found.parameters), "*", label)
+        solution = solve(problem, throw=False, interruptible=False)
+        if solution.status == "optimal":
+            quantity = "largest Im ω" if is_complex else "abscissa"
+            label = f"optimum ({solution.structure}), {quantity} {solution.abscissa:.4g}"
+            return _draw_mark(ax, plane.to_axis(solution.parameters), "*", label)
     allowed = np.isfinite(chart.abscissa) & chart.layers.get("satisfied", np.True_)
     if not allowed.any():
         return []
     values = np.where(allowed, chart.abscissa, np.inf)
     row, column = np.unravel_index(values.argmin(), values.shape)
-    x, y = _grid(chart, plane)
-    label = f"{'best Im ω' if of_H else 'least abscissa'} on the grid, {values[row, column]:.4g}"
-    return _mark(ax, (x[column], y[row]), "*", label)
+    x, y = _axis_values(chart, plane)
+    label = f"{'best Im ω' if is_complex else 'least abscissa'} on the grid, {values[row, column]:.4g}"
+    return _draw_mark(ax, (x[column], y[row]), "*", label)
 
 
-def _mark(ax: Axes, at: Iterable[float], marker: str, label: str) -> list[Line2D]:
+def _draw_mark(ax: Axes, place: Iterable[float], marker: str, label: str) -> list[Line2D]:
     size, yellow = 12 if marker == "*" else 6, "#F0E442"
-    return ax.plot(*at, marker, color=yellow, mec=LINE, markersize=size, zorder=6, label=label, clip_on=False)
+    return ax.plot(*place, marker, color=yellow, mec=LINE, markersize=size, zorder=6, label=label, clip_on=False)

@@ -1,4 +1,4 @@
-"""A Pareto front as a curve of two objectives, or as coloured points of three."""
+"""Draw a Pareto front: a curve for two objectives, coloured points for three."""
 
 import re
 from typing import Any
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from tmsopt.fronts.front import Front, FrontPoint
 from tmsopt.plots.labels import Name, finish_axes, scale_of
-from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, figure_of, on_axes
+from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABLE, ensure_axes, figure_of
 from tmsopt.records import Array
 
 _STYLES = {
@@ -23,20 +23,21 @@ _STYLES = {
     "pair": (HEAVY, "o"),
     "real": (CAPSIZE, "o"),
 }
-"""Colour and marker of each structure; others are black crosses."""
+"""Structure of the rightmost roots → colour and marker; other structures have black crosses."""
 
 
-def _style(structure: str) -> tuple[str, str]:
-    """A root of five or more drawn as EP4 is, and so with pairs."""
+def _find_style(structure: str) -> tuple[str, str]:
+    """Colour and marker of a structure; roots of multiplicity 5 or more look like EP4, such complex pairs like CEP2."""
     higher = re.fullmatch(r"(C?)EP\d+", structure)
     return _STYLES.get(structure) or (_STYLES["CEP2" if higher[1] else "EP4"] if higher else (LINE, "x"))
 
 
 def draw_front(data: Front, ax: Axes | None = None) -> Axes:
-    """A front of two objectives as a curve, cut at gaps, or of three as points, the third objective as colour.
+    """Draw a front: of two objectives as a curve with gaps, of three as points, with the third objective as colour.
 
-    The Axes show the first two objectives, in the units of the file: points by the structure of their roots; those that
-    are not stable are hollow with a ring, and the curve is dashed along them; kinks and ends have names.
+    The Axes show the first two objectives in the units of the file. Colour and marker of a point show the structure of
+    its rightmost roots. Points that are not stable are hollow and have a ring, and the curve between them is dashed.
+    Kinks and ends have names.
 
     Example:
         >>> oscillator = tmsopt.models.from_matrices([[1]], [["c"]], [[1]])  # x'' + c x' + x = 0
@@ -47,7 +48,7 @@ def draw_front(data: Front, ax: Axes | None = None) -> Axes:
 
     More: docs/how_to/fronts.md
     """
-    ax = on_axes(ax, 6.4, 5.0, data.problem.title or "Pareto front")
+    ax = ensure_axes(ax, 6.4, 5.0, data.problem.title or "Pareto front")
     scales = [scale_of(data.problem.posed, text) for text in data.objectives]
     columns = zip(*(p.objectives for p in data.points), strict=True)
     values = np.stack([s.to_axis(column) for s, column in zip(scales, columns, strict=True)], axis=-1)
@@ -55,17 +56,17 @@ def draw_front(data: Front, ax: Axes | None = None) -> Axes:
     if len(scales) == 2:
         _draw_curve(ax, data, values)
     else:
-        coloured = ax.scatter(values[:, 0], values[:, 1], 22, values[:, 2], zorder=3)
-        figure_of(ax).colorbar(coloured, ax=ax, label=scales[2].label)
+        points = ax.scatter(values[:, 0], values[:, 1], 22, values[:, 2], zorder=3)
+        figure_of(ax).colorbar(points, ax=ax, label=scales[2].label)
     rings = values[[not p.stable for p in data.points], :2]
-    if len(rings):  # not stable, or not known to be
+    if len(rings):  # not stable, or stability unknown
         ax.plot(*rings.T, "o", color=LINE, markerfacecolor="none", markersize=8, zorder=2.5, label="not stable")
     ax.margins(0.08)
-    return finish_axes(ax, _names(data.points, values))
+    return finish_axes(ax, _name_points(data.points, values))
 
 
 def front_figure(front: Front) -> Figure:
-    """A front in a figure of its own.
+    """Draw a front in a new figure.
 
     Example:
         >>> oscillator = tmsopt.models.from_matrices([[1]], [["c"]], [[1]])  # x'' + c x' + x = 0
@@ -79,7 +80,7 @@ def front_figure(front: Front) -> Figure:
 
 
 def _draw_curve(ax: Axes, front: Front, values: Array) -> None:
-    """Two objectives: the curve, cut at gaps, and points by the structure of their roots."""
+    """Draw the curve of two objectives with its gaps, and the points with colours for the structure of their roots."""
     gaps = {gap.index: gap for gap in front.gaps}
     stable = [bool(p.stable) for p in front.points]
     for k, piece in enumerate(np.stack([values[:-1], values[1:]], axis=-1)):
@@ -90,15 +91,14 @@ def _draw_curve(ax: Axes, front: Front, values: Array) -> None:
             look = {"color": CAPSIZE, "linestyle": ":", "linewidth": 0.8, "label": label}
         ax.plot(*piece, **look)
     kinds = [(p.structure, s) for p, s in zip(front.points, stable, strict=True)]
-    for structure, kept in dict.fromkeys(kinds):
-        own, (colour, marker) = values[[kind == (structure, kept) for kind in kinds]], _style(structure)
-        fill = colour if kept else "white"
-        ax.plot(*own.T, marker, color=colour, markerfacecolor=fill, markersize=4, zorder=3, label=structure)
+    for structure, is_stable in dict.fromkeys(kinds):
+        group, (colour, marker) = values[[kind == (structure, is_stable) for kind in kinds]], _find_style(structure)
+        fill = colour if is_stable else "white"
+        ax.plot(*group.T, marker, color=colour, markerfacecolor=fill, markersize=4, zorder=3, label=structure)
 
 
-def _names(points: tuple[FrontPoint, ...], values: Array) -> list[Name]:
-    """Names of the ends, and of kinks at which the structure changes; the table has limits that become active."""
+def _name_points(points: tuple[FrontPoint, ...], values: Array) -> list[Name]:
+    """Names of the ends, and of kinks where the structure changes. Kinks where only limits change have no name."""
     words = [[w for w in p.label.split("; ") if "->" in w or w.startswith(("least", "greatest"))] for p in points]
-    return [
-        Name(", ".join(w).replace("->", "→"), *map(float, at[:2])) for w, at in zip(words, values, strict=True) if w
-    ]
+    places = values[:, :2].tolist()
+    return [Name(", ".join(w).replace("->", "→"), *place) for w, place in zip(words, places, strict=True) if w]

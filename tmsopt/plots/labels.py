@@ -1,4 +1,4 @@
-"""Names of marked points, units and labels of axes, words for modes, and legends."""
+"""Write names beside marked points, labels and units on axes, and legends."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import Unit, unit_of
 from tmsopt.records import Array
 
-_SIZE = 8
+_FONT_SIZE = 8
 
-_SAME = 0.02  # of an axis: names of marks so close would stand beside the wrong ones
+_SAME_POINT = 0.02  # marks that are closer than this fraction of an axis share one label, to avoid confusion
 
-OF_H = {"real": r"$\mathrm{Im}\,\omega$ (loss negative)", "imag": r"$\mathrm{Re}\,\omega$"}
-"""Axes of the real and imaginary parts of s = −i ω of a complex H."""
+COMPLEX_H_LABELS = {"real": r"$\mathrm{Im}\,\omega$ (loss negative)", "imag": r"$\mathrm{Re}\,\omega$"}
+"""Axis labels of the real and imaginary parts of s = −i ω for a complex H (a matrix with gain or loss)."""
 
 
 @dataclass(frozen=True)
 class Name:
-    """A word for a marked point.
+    """A name of a marked point.
 
     Example:
         >>> name = tmsopt.plots.Name("EP4", x=2.236, y=0.411)
@@ -56,7 +56,7 @@ class AxisScale(NamedTuple):
         return self.symbol + (f" in {self.unit.text}" if self.unit.text else "")
 
     def to_axis(self, values: ArrayLike) -> Array:
-        """Numbers as they stand on the axis."""
+        """Convert numbers to the unit of the axis."""
         return np.asarray(values, dtype=float) / self.unit.one
 
 
@@ -67,33 +67,34 @@ class PlaneAxes(NamedTuple):
     vertical: AxisScale
 
     def to_axis(self, values: Mapping[str, ArrayLike]) -> Array:
-        """Where points stand on both axes, of shape (2, …), by the values of what is on them."""
+        """Positions of points on both axes, of shape (2, …), from the values of the parameters or expressions."""
         return np.array([axis.to_axis(values[axis.name]) for axis in self])
 
     def label(self, ax: Axes) -> None:
-        """Write what is on the axes."""
+        """Write the labels of both axes."""
         ax.set(xlabel=self.horizontal.label, ylabel=self.vertical.label)
 
 
 def plane_over(problem: Posed | None, *names: str | None) -> PlaneAxes:
-    """The plane of the first two names that are given, in the units of a problem; without one in SI and rad."""
+    """The plane of the first two names that are not None, in the units of the problem; without one, SI and rad."""
     first, second, *_ = (*filter(None, names), "", "")
     return PlaneAxes(*(scale_of(problem, n) if problem else AxisScale(n, n) for n in (first, second)))
 
 
 def scale_of(problem: Posed, text: str) -> AxisScale:
-    """The axis of a parameter of a problem, or of an expression in them."""
-    plain = text.strip()
-    name = plain.removeprefix("-").strip()
-    unit, of = unit_of(problem, name), problem.parameter_set
+    """The axis of a parameter of a problem, or of an expression in its parameters."""
+    expression = text.strip()
+    name = expression.removeprefix("-").strip()
+    unit, parameters = unit_of(problem, name), problem.parameter_set
     if name == "abscissa":
-        return AxisScale(plain, ("−" if name != plain else "") + abscissa_label(problem))
-    symbol = f"${'-' if name != plain else ''}{of[name].latex}$" if name in of.names else plain
-    return AxisScale(plain, symbol, unit)
+        return AxisScale(expression, ("−" if name != expression else "") + abscissa_label(problem))
+    sign = "-" if name != expression else ""
+    symbol = f"${sign}{parameters[name].latex}$" if name in parameters.names else expression
+    return AxisScale(expression, symbol, unit)
 
 
 def scale_over(problem: Posed, parameter: Parameter) -> AxisScale:
-    """The axis of a parameter of a problem, or of a native one that the problem is not written in."""
+    """The axis of a parameter of a problem, or of a parameter of the model that the problem does not use."""
     if parameter.name == "Fr":
         return AxisScale("Fr", r"Froude number $\mathrm{Fr} = v/\sqrt{gw}$")
     if parameter.name in problem.parameter_set.names:
@@ -102,31 +103,31 @@ def scale_over(problem: Posed, parameter: Parameter) -> AxisScale:
 
 
 def abscissa_label(problem: Posed, words: str = "spectral abscissa") -> str:
-    """The abscissa with its unit: 1/s of a model in SI, per √(g/w) where the model is dimensionless and its data SI."""
-    of = problem.parameter_set
+    """Label of the abscissa with its unit: 1/s for a model in SI, √(g/w) for a dimensionless model with data in SI."""
+    parameters = problem.parameter_set
     if problem.model.carrier is not None:
-        return rf"largest {OF_H['real']}"
-    if of.rate is None:
+        return rf"largest {COMPLEX_H_LABELS['real']}"
+    if parameters.rate is None:
         return words
-    return words + (" in 1/s" if of is problem.model.sets[0] else r" per $\sqrt{g/w}$")
+    return words + (" in 1/s" if parameters is problem.model.sets[0] else r" per $\sqrt{g/w}$")
 
 
 def events_of(model: Model) -> dict[str, str]:
-    """What a pair of roots, a root 0 and a root at infinity on their way to the right are called."""
+    """Event → its name: a pair of roots, a root 0 or a root at infinity enters the right half-plane."""
     return {**words_of(model), "infinity": "root at infinity"}
 
 
 def finish_axes(ax: Axes, names: Sequence[Name] = (), handles: Sequence[Artist] | None = None) -> Axes:
-    """The Axes with their legend and names beside their points."""
+    """Draw the legend, and the names beside their points; return the Axes."""
     draw_legend(ax, ax.get_legend_handles_labels()[0] if handles is None else handles)
     place_names(ax, names)
     return ax
 
 
 def place_names(ax: Axes, names: Sequence[Name]) -> None:
-    """Write names beside their points, clear of curves, of one another and of the frame; limits must stand.
+    """Write names beside their points, away from curves, other names and the frame.
 
-    Points that fall together share one label.
+    The limits of the Axes must be set before. Points at the same place share one label.
 
     Example:
         >>> axes = tmsopt.plots.new_figure(3, 3).subplots()  # from 0 to 1
@@ -141,13 +142,16 @@ def place_names(ax: Axes, names: Sequence[Name]) -> None:
         place_all([(ax, names)])
 
 
-def place_all(found: Sequence[tuple[Axes, Sequence[Name]]]) -> None:
-    """The same in several Axes of one figure, whose layout stands meanwhile: it says how large a text is in them."""
-    figure = figure_of(found[0][0])
+def place_all(axes_names: Sequence[tuple[Axes, Sequence[Name]]]) -> None:
+    """Write names in several Axes of one figure.
+
+    The layout is computed first and kept fixed, because the size of a text relative to the Axes depends on it.
+    """
+    figure = figure_of(axes_names[0][0])
     engine = figure.get_layout_engine()
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
-    for ax, names in found:
+    for ax, names in axes_names:
         _place(ax, names)
     figure.set_layout_engine(engine)
 
@@ -158,8 +162,8 @@ def _place(ax: Axes, names: Sequence[Name]) -> None:
     for name in names:
         place = name.x, name.y
         if np.array_equal(np.clip(place, low, high), place):
-            near = (p for p in merged if np.all(np.abs(np.subtract(p, place)) <= _SAME * (high - low)))
-            words = merged.setdefault(next(near, place), [])
+            neighbours = (p for p in merged if np.all(np.abs(np.subtract(p, place)) <= _SAME_POINT * (high - low)))
+            words = merged.setdefault(next(neighbours, place), [])
             words += [name.text] * (name.text not in words)
     if not merged:
         return
@@ -174,7 +178,7 @@ def _place(ax: Axes, names: Sequence[Name]) -> None:
         y_scatter=y,
         x_lines=[xy[0] for xy in curves],
         y_lines=[xy[1] for xy in curves],
-        textsize=_SIZE,
+        textsize=_FONT_SIZE,
         linecolor="0.4",
         linewidth=0.6,
         zorder=7,
@@ -183,7 +187,7 @@ def _place(ax: Axes, names: Sequence[Name]) -> None:
 
 
 def _visible_pieces(ax: Axes, xy: ArrayLike) -> list[Array]:
-    """The pieces of a curve inside the figure, by as few points as show it to a tenth of a pixel."""
+    """The pieces of a curve inside the figure, with few points but exact to a tenth of a pixel."""
     width, height = figure_of(ax).canvas.get_width_height(physical=True)
-    drawn = Path(np.asarray(xy, dtype=float)).to_polygons(ax.transData, width, height, closed_only=False)
-    return [ax.transData.inverted().transform(piece) for piece in map(np.asarray, drawn) if len(piece) > 1]
+    polygons = Path(np.asarray(xy, dtype=float)).to_polygons(ax.transData, width, height, closed_only=False)
+    return [ax.transData.inverted().transform(piece) for piece in map(np.asarray, polygons) if len(piece) > 1]

@@ -1,4 +1,4 @@
-"""Roots in the complex plane, and how a multiple one splits."""
+"""Draw roots in the complex plane, and how a multiple root splits."""
 
 import math
 from collections.abc import Iterable
@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from tmsopt.analysis import Diagnosis, Optimality
-from tmsopt.plots.labels import OF_H, finish_axes
-from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, MARK, REAL, note, on_axes
+from tmsopt.plots.labels import COMPLEX_H_LABELS, finish_axes
+from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, MARK, REAL, ensure_axes, note
 from tmsopt.problem.solution import Solution
 from tmsopt.proofs import Proof
 
@@ -17,10 +17,11 @@ _STYLES = ("-", "--", "-.", ":")
 
 
 def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> Axes:
-    """Roots with their multiplicities, of a judgement of an optimum those on the rightmost line.
+    """Draw roots with their multiplicities; for an `Optimality`, only those on the rightmost line.
 
-    The Axes show the complex plane, in 1/s for a problem in SI; the half of it where motion grows is grey: of a complex
-    H, whose eigenfrequencies they show, the upper one. The title of a proof says how narrow the proved balls are.
+    The Axes show the complex plane, in 1/s for a problem in SI. The half where motion grows is grey. For a complex H
+    the Axes show eigenfrequencies, and the upper half is grey. For a proof, the title says how narrow the proved
+    intervals are.
 
     Example:
         >>> axes = tmsopt.plots.draw_roots(tmsopt.solve("problems/ep4.toml"))
@@ -31,63 +32,64 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
     """
     rate, unit = 1.0, ""
     if isinstance(data, Optimality):
-        of_H = any(root.eigenfrequency is not None for root in data.roots)
+        is_complex = any(root.eigenfrequency is not None for root in data.roots)
     else:
-        of_H = bool(data.eigenfrequencies)
+        is_complex = bool(data.eigenfrequencies)
     if isinstance(data, Solution):
-        if (of := data.problem.posed.parameter_set).rate is not None:
-            rate, unit = float(of.rate(data.parameters)), " in 1/s"
-        reach = f"rightmost at {rate * data.abscissa:.5g}{unit[3:]}"
-        if of_H:
-            reach = f"largest Im ω {max(w.im for w in data.eigenfrequencies):.5g}"
-        title = f"{data.problem.title}\n{data.structure}, {reach}".strip()
+        if (parameters := data.problem.posed.parameter_set).rate is not None:
+            rate, unit = float(parameters.rate(data.parameters)), " in 1/s"
+        extreme = f"rightmost at {rate * data.abscissa:.5g}{unit[3:]}"
+        if is_complex:
+            extreme = f"largest Im ω {max(w.im for w in data.eigenfrequencies):.5g}"
+        title = f"{data.problem.title}\n{data.structure}, {extreme}".strip()
     elif isinstance(data, Proof):
-        narrow = f"each number within {data.radius:.1g}" if math.isfinite(data.radius) else data.method
-        title = f"{data.claim}:\n" + (f"proved, {narrow}" if data.proved else "not proved")
+        precision = f"each number within {data.radius:.1g}" if math.isfinite(data.radius) else data.method
+        title = f"{data.claim}:\n" + (f"proved, {precision}" if data.proved else "not proved")
     else:
         title = f"{data.goal or 'abscissa'}: {data.verdict}"
-    ax = on_axes(ax, 4.6, 4.4)
+    ax = ensure_axes(ax, 4.6, 4.4)
     ax.set_title(title, fontsize=9.5)
     ax.axhline(0, color="grey", linewidth=0.6)
     roots = [(float(r.re), float(r.im), r.multiplicity) for r in data.roots]
-    if of_H:
-        found = {(0.0 - im, re): m for re, im, m in roots}
+    if is_complex:
+        positions = {(0.0 - im, re): m for re, im, m in roots}
         problem = getattr(data, "problem", None)
-        _frame_frequencies(ax, found, abs(problem.model.carrier or 1.0) if problem else 1.0)
+        _frame_frequencies(ax, positions, abs(problem.model.carrier or 1.0) if problem else 1.0)
     else:
-        found = {(rate * re, rate * im * side): m for re, im, m in roots for side in (1, -1)}
-        size = max((math.hypot(*z) for z in found), default=1.0) * 1.3 or 1.0
+        positions = {(rate * re, rate * im * side): m for re, im, m in roots for side in (1, -1)}
+        size = max((math.hypot(*z) for z in positions), default=1.0) * 1.3 or 1.0
         ax.axvspan(0, size, color="0.92", zorder=0)
         ax.axvline(0, color="grey", linewidth=0.6)
-        ax.set(xlim=(-size, max([0.3 * size, *(1.2 * re for re, _ in found)])), ylim=(-size, size))
+        ax.set(xlim=(-size, max([0.3 * size, *(1.2 * re for re, _ in positions)])), ylim=(-size, size))
         ax.set(xlabel=rf"$\mathrm{{Re}}\,s${unit}", ylabel=rf"$\mathrm{{Im}}\,s${unit}")
-    for place, m in found.items():
+    for place, m in positions.items():
         ax.plot(*place, "o" if m == 1 else "s", color=REAL if m == 1 else MARK, markersize=5 + m)
         if m > 1:
             note(ax, f"{m}-fold", place, (7, 7), fontsize=9)
     return finish_axes(ax)
 
 
-def _frame_frequencies(ax: Axes, found: Iterable[tuple[float, float]], scale: float) -> None:
-    """Limits around eigenfrequencies, and the half of the plane above the real axis, where motion grows.
+def _frame_frequencies(ax: Axes, positions: Iterable[tuple[float, float]], scale: float) -> None:
+    """Set limits around eigenfrequencies, and colour the half-plane above the real axis, where motion grows.
 
     Args:
-        scale: of the problem: less than 1e-12 of it is 0 but for rounding.
+        scale: size of frequencies in the problem; sizes below 1e-12 of it are rounding errors.
     """
-    x, y = np.array([*found]).T
+    x, y = np.array([*positions]).T
     middle, low, high = np.mean(x), min(0.0, *y), max(0.0, *y)
     size = max(np.ptp(x), high - low)
     size = size if size > 1e-12 * scale else max(abs(middle), scale)
     ax.axhspan(0, high + size, color="0.92", zorder=0)
     ax.set(xlim=(middle - 0.8 * size, middle + 0.8 * size), ylim=(low - 0.3 * size, high + 0.3 * size))
-    ax.set(xlabel=OF_H["imag"], ylabel=OF_H["real"])
+    ax.set(xlabel=COMPLEX_H_LABELS["imag"], ylabel=COMPLEX_H_LABELS["real"])
 
 
 def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
-    """How far a multiple root splits when one parameter changes.
+    """Draw how far a multiple root splits when one parameter changes.
 
-    The Axes show the largest shift over the change ε, relative or for a parameter that is 0 absolute, both logarithmic:
-    a line per parameter as far as the law holds, with its exponent.
+    The Axes show the largest shift of a root over the change ε, both on logarithmic scales. The change is relative, or
+    absolute for a parameter that is 0. Each parameter has a line, which ends where its law ceases to hold; the legend
+    shows the exponent of the law.
 
     Example:
         >>> diagnosis, = tmsopt.diagnose(tmsopt.solve("problems/ep4.toml"))
@@ -97,11 +99,11 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
 
     More: docs/explanation/exceptional_points.md
     """
-    place, farthest = f"pair at {data.re:.5g} ± {data.im:.5g}i" if data.im else f"root at {data.re:.5g}", "root"
+    place, root_name = f"pair at {data.re:.5g} ± {data.im:.5g}i" if data.im else f"root at {data.re:.5g}", "root"
     if (omega := data.eigenfrequency) is not None:
-        farthest = "eigenfrequency"
-        place = f"{farthest} {f'{omega:.5g}'.replace('j', 'i') if omega else 0}"
-    ax = on_axes(ax, 6.0, 4.4, f"{data.algebraic}-fold {place}, {data.kind}")
+        root_name = "eigenfrequency"
+        place = f"{root_name} {f'{omega:.5g}'.replace('j', 'i') if omega else 0}"
+    ax = ensure_axes(ax, 6.0, 4.4, f"{data.algebraic}-fold {place}, {data.kind}")
     for k, response in enumerate(data.responses):
         for law in response.laws[:1]:
             reach = min(max(law.below, law.above, 1e-15), 1.0)
@@ -109,5 +111,5 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
             label, style = rf"{response.parameter}: $\varepsilon^{{{power}}}$", "o" + _STYLES[k % 4]
             shift = law.branches.size * eps ** float(power)
             ax.loglog(eps, shift, style, color=_COLOURS[k % 5], label=label, markevery=[1], markersize=4)
-    ax.set(xlabel=r"change $\varepsilon$ of a parameter", ylabel=f"shift of the farthest {farthest}")
+    ax.set(xlabel=r"change $\varepsilon$ of a parameter", ylabel=f"shift of the farthest {root_name}")
     return finish_axes(ax)

@@ -1,4 +1,4 @@
-"""What all figures share: colours that the colour-blind can tell apart, sizes for print, and saving."""
+"""What all figures share: colours that colour-blind people can distinguish, sizes for print, and saving."""
 
 import warnings
 from collections.abc import Sequence
@@ -18,20 +18,20 @@ from numpy.typing import ArrayLike
 from tmsopt.files import as_path, write_atomic
 
 STABLE, HEAVY, LINE, MARK, CRITICAL = "#56B4E9", "#E69F00", "#000000", "#D55E00", "#0072B2"
-"""Fills of stability and heavy damping, lines, marked points, the weave boundary (Okabe–Ito)."""
+"""Colours (Okabe–Ito palette) of stability, heavy damping, lines, marked points and the weave boundary."""
 
 REAL, COMPLEX, CAPSIZE = "#009E73", "#CC79A7", "#999999"
-"""Real and complex exceptional points, the capsize boundary."""
+"""Colours of real and of complex exceptional points, and of the capsize boundary."""
 
 EDGE: dict[str, Any] = {"markeredgecolor": "black", "markeredgewidth": 0.6}
-"""Of filled markers."""
+"""Edge of filled markers."""
 
-_ENTRY = 2.6  # inches of a legend entry
-_OWN = "own"  # label of Axes in a figure of their own, which has its legend below
+_ENTRY_WIDTH = 2.6  # width of a legend entry in inches
+_OWN_FIGURE = "own"  # label of Axes that have a figure for themselves; its legend is below them
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, sizes in inches, that needs no display.
+    """Make an empty figure that needs no display; width and height are in inches.
 
     Example:
         >>> figure = tmsopt.plots.new_figure(6.4, 4.8)
@@ -45,43 +45,43 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def on_axes(ax: Axes | None, width: float, height: float, title: str = "") -> Axes:
-    """The Axes given, or those of a new figure with a title."""
+def ensure_axes(ax: Axes | None, width: float, height: float, title: str = "") -> Axes:
+    """Return the given Axes; if they are None, those of a new figure with a title."""
     if ax is None:
         ax = new_figure(width, height).subplots()
-        ax.set(label=_OWN)
+        ax.set(label=_OWN_FIGURE)
         ax.set_title(title, fontsize=11)
     return ax
 
 
 def figure_of(ax: Axes) -> Figure:
-    """The whole figure that Axes stand in."""
-    figure: Figure = ax.figure.figure  # that of a part of a figure is the whole
+    """The whole figure that holds the Axes."""
+    figure: Figure = ax.figure.figure  # the second attribute leads from a part of a figure to the whole
     return figure
 
 
 def draw_legend(ax: Axes, handles: Sequence[Artist]) -> None:
-    """The legend of Axes, in a figure of their own below it."""
-    if ax.get_label() == _OWN:
+    """Draw the legend of Axes: inside them, or below them if they have a figure for themselves."""
+    if ax.get_label() == _OWN_FIGURE:
         legend_below(figure_of(ax), handles)
     else:
         _legend(ax, handles, fontsize=7, framealpha=0.9)
 
 
 def legend_below(figure: Figure, handles: Sequence[Artist], columns: int | None = None) -> None:
-    """One legend for the whole figure, below it, where it covers nothing."""
-    columns = columns or int(figure.get_figwidth() / _ENTRY)
+    """Draw one legend for the whole figure, below it, so that it covers nothing."""
+    columns = columns or int(figure.get_figwidth() / _ENTRY_WIDTH)
     _legend(figure, handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False)
 
 
 def _legend(place: Axes | Figure, handles: Sequence[Artist], **look: Any) -> None:
-    """A legend that has each label once."""
-    if once := {str(h.get_label()): h for h in handles}:
-        place.legend(handles=list(once.values()), **look)
+    """Draw a legend that has each label once."""
+    if entries := {str(h.get_label()): h for h in handles}:
+        place.legend(handles=list(entries.values()), **look)
 
 
 def draw_bands(ax: Axes, stable: ArrayLike, heavily_damped: ArrayLike) -> None:
-    """Bands of stability and of heavy damping."""
+    """Draw bands of stability and of heavy damping."""
     for bands, colour, words in (stable, STABLE, "stable"), (heavily_damped, HEAVY, "heavily damped"):
         for low, high in np.reshape(bands, (-1, 2)):
             ax.axvspan(low, high, color=colour, alpha=0.25, linewidth=0, label=words)
@@ -93,22 +93,24 @@ def entry(label: str, color: str, style: LineStyleType = "-", **look: Any) -> Ar
 
 
 def note(ax: Axes, text: str, place: Any, offset: tuple[float, float], **look: Any) -> None:
-    """A text beside a point, by an offset in points."""
+    """Write a text beside a point; the offset is in points (1/72 inch)."""
     look = {"fontsize": 8, "horizontalalignment": "right" if offset[0] < 0 else "left", **look}
     ax.annotate(text, place, offset, textcoords="offset points", **look)
 
 
 def arrow(ax: Axes, start: Any, end: Any, **look: Any) -> None:
-    """An arrow from point to point."""
+    """Draw an arrow between two points."""
     style = "-|>,head_width=0.25,head_length=0.5"
     ax.annotate("", end, start, arrowprops={"arrowstyle": style, "shrinkA": 0, "shrinkB": 0, **look})
 
 
 def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
-    """Write a figure, or that of Axes, as a whole or not at all; the format is the ending of the name.
+    """Write a figure, or the figure of Axes, to a file; the ending of the name is the format.
+
+    An incomplete file is never left.
 
     Raises:
-        OSError: when the file cannot be written.
+        OSError: if the file cannot be written.
 
     Example:
         >>> import pathlib, tempfile
@@ -122,15 +124,15 @@ def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
     """
     path = as_path(path, "the file to write")
     figure = figure_of(drawn_on) if isinstance(drawn_on, Axes) else drawn_on
-    ending = path.suffix.lstrip(".").lower()
+    file_format = path.suffix.lstrip(".").lower()
     with write_atomic(path) as temporary:
-        temporary.write_bytes(render(figure, ending))
+        temporary.write_bytes(render(figure, file_format))
 
 
-def render(figure: Figure, ending: str) -> bytes:
-    """A figure as what a file of that ending holds."""
+def render(figure: Figure, file_format: str) -> bytes:
+    """The content of a file with the figure, in the format of that name, e.g. ``png``."""
     sink = BytesIO()
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph", UserWarning)  # of letters that no font here has: boxes show that
-        figure.savefig(sink, dpi=200, format=ending)
+        warnings.filterwarnings("ignore", "Glyph", UserWarning)  # for letters without a glyph; the figure has boxes
+        figure.savefig(sink, dpi=200, format=file_format)
     return sink.getvalue()

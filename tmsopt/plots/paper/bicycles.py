@@ -1,4 +1,4 @@
-"""The bicycles of the paper: their parameters, their growth rates, and the experimental one beside the scaling law."""
+"""Figures of the bicycles of the paper: parameters, growth rates, and the experimental bicycle with the scaling law."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,17 +17,17 @@ from tmsopt.problem.problem import Problem
 from tmsopt.search.solve import solve
 
 _POINTS = (("*", MARK, 13, (14, -8)), ("s", CRITICAL, 7, (12, 2)), ("o", REAL, 7, (12, -14)))
-"""Marker, colour, size and place of the text of each bicycle."""
+"""Marker, its colour and size, and offset of the text of each bicycle."""
 
 _CURVES = ((LINE, "-"), (CRITICAL, "--"), (REAL, "-."), (COMPLEX, ":"))
 
 
 def bicycle_figure() -> Figure:
-    """The side view beside the enlargement that shows u_H, with the numbers below."""
+    """The side view of the benchmark bicycle and an enlargement that shows u_H, with the parameters below."""
     data, figure = sketch(benchmark().parameters), new_figure(9.0, 4.1)
-    side, near = figure.subplots(1, 2, width_ratios=(2.35, 1))
+    side, enlargement = figure.subplots(1, 2, width_ratios=(2.35, 1))
     draw_bicycle(data, side).set_title("The two-mass-skate bicycle: the benchmark, to scale")
-    draw_distance(data, near).set_title("enlarged: $H$ and the steer axis")
+    draw_distance(data, enlargement).set_title("enlarged: $H$ and the steer axis")
     p = data.parameters
     figure.supxlabel(
         rf"$\chi_B = x_B/w = {p['chi_B']:.4g}$    $\zeta_B = z_B/w = {p['zeta_B']:.4g}$    "
@@ -39,31 +39,31 @@ def bicycle_figure() -> Figure:
 
 
 def growth_figure() -> Figure:
-    """Growth rates Re s with bands of stability and heavy damping, the critical Fr and that of the least abscissa."""
-    others = {name: value for name, value in benchmark().parameters.items() if name != "Fr"}
-    fastest = solve(Problem(tms, fixed=others, free={"Fr": (0.1, 4.0)}, minimize="abscissa"), interruptible=False)
+    """Growth rates Re s with bands of stability and heavy damping, the critical Fr and the Fr of the least abscissa."""
+    fixed = {name: value for name, value in benchmark().parameters.items() if name != "Fr"}
+    fastest = solve(Problem(tms, fixed=fixed, free={"Fr": (0.1, 4.0)}, minimize="abscissa"), interruptible=False)
     best = solve(Problem(tms, fixed=dict(optimised_benchmark().parameters)))
     figure = new_figure(9.2, 4.4)
     panels = figure.subplots(1, 2)
     for ax, design, name in zip(panels, (fastest, best), ("(a) benchmark", "(b) optimised benchmark"), strict=True):
-        at = design.dimensionless["Fr"], design.abscissa
-        ax.axhline(at[1], color="0.5", linewidth=0.8, linestyle=":")
+        optimum = design.dimensionless["Fr"], design.abscissa
+        ax.axhline(optimum[1], color="0.5", linewidth=0.8, linestyle=":")
         names = draw_curves(ax, growth(design, end=4.0), "real")
-        ax.plot(*at, "o", color=MARK, zorder=5)
+        ax.plot(*optimum, "o", color=MARK, zorder=5)
         ax.set_ylim(-4, 4)
         finish_axes(ax, names)
-        ax.set_title(rf"{name}: least abscissa ${at[1]:.4g}$ at $\mathrm{{Fr}} = {at[0]:.4f}$")
+        ax.set_title(rf"{name}: least abscissa ${optimum[1]:.4g}$ at $\mathrm{{Fr}} = {optimum[0]:.4f}$")
     return figure
 
 
 def experiment_figure() -> Figure:
-    """The law with the bicycles beside it, and how flat the optimum of Fr_c is."""
+    """The law with the bicycles, and the critical Froude number near its minimum, which is flat."""
     data, figure = experiment(), new_figure(9.2, 4.4)
-    left, right = figure.subplots(1, 2)
-    draw_law(left, data)
-    draw_critical_speeds(right, data)
-    left.set_title(r"(a) The law holds for $\chi_H = 1$;" "\n" r"these bicycles have another $\chi_H$")
-    right.set_title(
+    law_axes, speed_axes = figure.subplots(1, 2)
+    draw_law(law_axes, data)
+    draw_critical_speeds(speed_axes, data)
+    law_axes.set_title(r"(a) The law holds for $\chi_H = 1$;" "\n" r"these bicycles have another $\chi_H$")
+    speed_axes.set_title(
         rf"(b) $\zeta_B$, $\zeta_H$ as built; assumed $\lambda_s = {np.rad2deg(data.lambda_s):.0f}°$ and $\mu$"
         "\n"
         rf"With $\chi_H = {data.bicycles[0].parameters['chi_H']:g}$ it is stable only if "
@@ -73,15 +73,15 @@ def experiment_figure() -> Figure:
 
 
 def draw_law(ax: Axes, data: Experiment) -> None:
-    """The law χ_B = √(ζ_B/ζ_H) for χ_H = 1, and the bicycles beside it with their own χ_H."""
+    """Draw the law χ_B = √(ζ_B/ζ_H) for χ_H = 1, and the bicycles, which have another χ_H."""
     ax.plot(data.ratio, data.law, color=LINE, label=r"$\chi_B = \sqrt{\zeta_B/\zeta_H}$, the law for $\chi_H = 1$")
     places = [(b.parameters["zeta_B"] / b.parameters["zeta_H"], b.parameters["chi_B"]) for b in data.bicycles]
-    for bicycle, at, (marker, colour, size, offset) in zip(data.bicycles, places, _POINTS, strict=True):
-        ax.plot(*at, marker, color=colour, markersize=size, **EDGE)
-        text = f"{bicycle.name}\n" + rf"$\chi_B = {at[1]:.4g}$, $\chi_H = {bicycle.parameters['chi_H']:.4g}$"
+    for bicycle, place, (marker, colour, size, offset) in zip(data.bicycles, places, _POINTS, strict=True):
+        ax.plot(*place, marker, color=colour, markersize=size, **EDGE)
+        text = f"{bicycle.name}\n" + rf"$\chi_B = {place[1]:.4g}$, $\chi_H = {bicycle.parameters['chi_H']:.4g}$"
         if np.isfinite(bicycle.omega0):
             text += "\n" + rf"on the law for any $\chi_H$, $\omega_0 = {bicycle.omega0:g}$"
-        note(ax, text, at, offset, verticalalignment="top" if offset[1] < 0 else "bottom")
+        note(ax, text, place, offset, verticalalignment="top" if offset[1] < 0 else "bottom")
     ratio, chi_B = places[0]
     law = float(np.interp(ratio, data.ratio, data.law))
     ax.plot([ratio, ratio], [chi_B, law], color=MARK)
@@ -91,19 +91,27 @@ def draw_law(ax: Axes, data: Experiment) -> None:
 
 
 def draw_critical_speeds(ax: Axes, data: Experiment) -> None:
-    """Fr_c over χ_B for the geometry of the experimental bicycle, with the minima and the χ_B that was built."""
+    """Draw Fr_c over χ_B for the geometry of the experimental bicycle, with the minima and the χ_B that was built."""
     flat = rf"within {100 * SLACK:.0f} % of the minimum, $\chi_H = 1$"
     ax.axvspan(*data.critical[0].flat, color=STABLE, alpha=0.25, linewidth=0, label=flat)
     for curve, (colour, style) in zip(data.critical, _CURVES, strict=False):
-        of = " (the law), any $\\mu$" if np.isnan(curve.mu) else rf" as built, $\mu = {curve.mu:g}$"
-        ax.plot(curve.chi_B, curve.Fr_c, style, color=colour, label=rf"$\chi_H = {curve.chi_H:g}$" + of)
+        conditions = " (the law), any $\\mu$" if np.isnan(curve.mu) else rf" as built, $\mu = {curve.mu:g}$"
+        ax.plot(curve.chi_B, curve.Fr_c, style, color=colour, label=rf"$\chi_H = {curve.chi_H:g}$" + conditions)
         ax.plot(*curve.best, "v", color=colour, markeredgecolor="white")
     ax.plot([], [], "v", color="0.3", label=r"minimum over $\chi_B$")
-    built = data.bicycles[0].parameters["chi_B"]
-    words = rf"as built, $\chi_B = {built:g}$"
-    ax.axvline(built, color=MARK)
-    own = [curve.own for curve in data.critical]
-    ax.plot(np.full(len(own), built), own, "*", markersize=10, color=MARK, label=words, **EDGE)
+    chi_B = data.bicycles[0].parameters["chi_B"]
+    words = rf"as built, $\chi_B = {chi_B:g}$"
+    ax.axvline(chi_B, color=MARK)
+    speeds = [curve.own for curve in data.critical]
+    ax.plot(
+        np.full(len(speeds), chi_B),
+        speeds,
+        "*",
+        markersize=10,
+        color=MARK,
+        label=words,
+        **EDGE,
+    )
     least = np.nanmin([curve.best[1] for curve in data.critical])
     ax.set(xlim=(1, 2.05), ylim=(0.93 * least, 1.9 * least))
     ax.set(xlabel=r"$\chi_B$", ylabel=r"critical Froude number $\mathrm{Fr}_c$")

@@ -1,7 +1,8 @@
-"""The figures of the paper, and others about it, by name: from reference designs to finished figures.
+"""The list of the figures of the paper, and of others about it.
 
-To add one, write a function `NAME_figure` that takes nothing and returns a Figure, its line in `__init__.pyi`, and an
-Item with it. The module is imported when the figure is made, so that listing the figures loads nothing heavy.
+To add a figure, write a function `NAME_figure` that has no arguments and returns a Figure, add its line to
+`__init__.pyi`, and add an Item to the list. The module of a figure is imported when the figure is made, so that the
+list is available without Matplotlib.
 """
 
 from collections.abc import Generator, Sequence
@@ -15,18 +16,18 @@ from tmsopt.records import Table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_LOOK: Any = {"axes.titlesize": 9.5, "legend.fontsize": 7.5, "legend.title_fontsize": 7.5, "legend.framealpha": 0.9}
-"""Settings of Matplotlib for every figure."""
+_SETTINGS: Any = {"axes.titlesize": 9.5, "legend.fontsize": 7.5, "legend.title_fontsize": 7.5, "legend.framealpha": 0.9}
+"""Settings of Matplotlib for all figures."""
 
 
 @dataclass(frozen=True)
 class Item:
-    """A figure that can be asked for.
+    """A figure of the list.
 
     Attributes:
-        name: on the command line.
-        alias: its label in the paper, empty where it is not there.
-        caption: what it shows.
+        name: name of the figure on the command line.
+        alias: label of the figure in the paper; empty if the paper does not have it.
+        caption: what the figure shows.
     """
 
     name: str
@@ -34,26 +35,26 @@ class Item:
     caption: str
 
     def make(self) -> "Figure":
-        """The figure, its data computed anew."""
+        """Compute the data and draw the figure."""
         from matplotlib import rc_context
 
-        with rc_context(_LOOK):
-            made: Figure = getattr(import_module("tmsopt.plots.paper"), f"{self.name.replace('-', '_')}_figure")()
-        return made
+        with rc_context(_SETTINGS):
+            figure: Figure = getattr(import_module("tmsopt.plots.paper"), f"{self.name.replace('-', '_')}_figure")()
+        return figure
 
 
 def find(name: str) -> Item:
-    """The figure of that name or alias.
+    """Find a figure by its name or alias.
 
     Raises:
         InputError: for an unknown name, with a suggestion.
     """
     from tmsopt.errors import input_error, suggest
 
-    named = {key: item for item in GALLERY.values() for key in (item.name, item.alias) if key}
-    if name not in named:
-        raise input_error(f"found '{name}'; {suggest(name, named)}", "NAME")
-    return named[name]
+    figures = {key: item for item in GALLERY.values() for key in (item.name, item.alias) if key}
+    if name not in figures:
+        raise input_error(f"found '{name}'; {suggest(name, figures)}", "NAME")
+    return figures[name]
 
 
 _ITEMS = (
@@ -116,20 +117,23 @@ GALLERY = Table({item.name: item for item in _ITEMS})
 """Figures by name, in the order of the list."""
 
 
-def pictures(items: Sequence[Item], endings: Sequence[str]) -> Generator[tuple[int, bytes]]:
-    """What the files of figures hold, each with its place, as they are finished.
+def pictures(items: Sequence[Item], file_formats: Sequence[str]) -> Generator[tuple[int, bytes]]:
+    """Yield the index and the content of the file of each figure, in the order in which they are finished.
 
-    Several are drawn by processes of their own, as many as are of use; what one of them fails at is drawn here.
+    Several figures are drawn by several processes. If a process crashes, its figure is drawn in this one.
     """
     workers = min(cores(), len(items))
     with processes(workers) if workers > 1 else here() as executor:
-        for place, picture in executor.map(_picture, zip([item.name for item in items], endings, strict=True)):
-            yield place, _picture((items[place].name, endings[place])) if isinstance(picture, Crash) else picture
+        for place, picture in executor.map(_render_item, zip([item.name for item in items], file_formats, strict=True)):
+            yield (
+                place,
+                _render_item((items[place].name, file_formats[place])) if isinstance(picture, Crash) else picture,
+            )
 
 
-def _picture(asked: tuple[str, str]) -> bytes:
-    """A figure by its name, and the ending of its file."""
+def _render_item(task: tuple[str, str]) -> bytes:
+    """Draw the figure of a task, which is its name and its file format."""
     from tmsopt.plots.style import render
 
-    name, ending = asked
-    return render(GALLERY[name].make(), ending)
+    name, file_format = task
+    return render(GALLERY[name].make(), file_format)

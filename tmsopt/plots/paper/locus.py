@@ -1,4 +1,4 @@
-"""Root loci in the complex plane, drawn into Axes that the caller made."""
+"""Draw root loci in the complex plane."""
 
 from collections.abc import Sequence
 
@@ -12,17 +12,17 @@ from tmsopt.plots.style import COMPLEX, CRITICAL, EDGE, LINE, MARK, REAL, arrow,
 from tmsopt.records import Array
 
 _CURVES = ((LINE, 1.5), (CRITICAL, 1.0), (MARK, 1.0))
-"""Colour and width at χ_B of the law, below it, above it."""
+"""Colour and width of the loci at the χ_B of the law, below it and above it."""
 
 NAMES = {"EP4": r"$\mathrm{EP}_4$", "2EP2": r"$2\mathrm{EP}_2$", "CEP2": r"$\mathrm{CEP}_2$", "EP2": r"$\mathrm{EP}_2$"}
-"""Multiple roots in the symbols of the paper."""
+"""Structure → symbol of the paper."""
 
 Window = Array
-"""Left, right, low and high."""
+"""Limits: left, right, bottom and top."""
 
 
 def draw_row(ax: Axes, row: LocusRow, window: Window, arrows: int) -> list[Name]:
-    """The three loci of one steer axis tilt with the circle |s| = |ω0|, inside a window; names of multiple roots."""
+    """Draw the three loci of one steer axis tilt with the circle |s| = |ω0|; return the names of multiple roots."""
     size, law = abs(row.bicycle.omega0), row.loci[0]
     ax.axhline(0, color="0.75", linewidth=0.6)
     ax.axvline(0, color="0.4", linewidth=0.8)
@@ -53,22 +53,25 @@ def draw_row(ax: Axes, row: LocusRow, window: Window, arrows: int) -> list[Name]
 
 
 def root_locus_figure() -> Figure:
-    """The whole complex plane beside an enlargement around the exceptional points, a row per steer axis tilt."""
+    """For each steer axis tilt a row: the whole complex plane, and an enlargement around the exceptional points."""
     rows = table_1_loci()
     figure = new_figure(7.4, 3.05 * len(rows) + 0.4)
     axes, names = figure.subplots(len(rows), 2), list[tuple[Axes, Sequence[Name]]]()
-    for (left, right), row, letter in zip(axes, rows, "abc", strict=True):
-        near = _zoom_window(row)
-        names += [(left, draw_row(left, row, full_window(row), 1)), (right, draw_row(right, row, near, 2))]
-        left.plot(near[[0, 1, 1, 0, 0]], near[[2, 2, 3, 3, 2]], ":", color="0.4", linewidth=0.7)
+    for (main, detail), row, letter in zip(axes, rows, "abc", strict=True):
+        zoom = _zoom_window(row)
+        names += [
+            (main, draw_row(main, row, full_window(row), 1)),
+            (detail, draw_row(detail, row, zoom, 2)),
+        ]
+        main.plot(zoom[[0, 1, 1, 0, 0]], zoom[[2, 2, 3, 3, 2]], ":", color="0.4", linewidth=0.7)
         name, tilt = row.bicycle.name, row.bicycle.parameters["lambda_s"]
         offset = {"2EP2": " - 0.05", "CEP2": " + 0.8"}.get(name, "")
         exact = r"\arctan(\frac{15}{4} - \frac{75}{32}\sqrt{2})"
-        left.set(title=rf"({letter}) $\lambda_s = {exact}{offset} = {tilt:.4f}$ rad", ylabel=r"$\mathrm{Im}\,s$")
-        right.set_title(rf"enlarged: {NAMES[name]} at $\mathrm{{Fr}} = {row.loci[0].design:.6g}$")
+        main.set(title=rf"({letter}) $\lambda_s = {exact}{offset} = {tilt:.4f}$ rad", ylabel=r"$\mathrm{Im}\,s$")
+        detail.set_title(rf"enlarged: {NAMES[name]} at $\mathrm{{Fr}} = {row.loci[0].design:.6g}$")
         shifts = "", f" - {row.offset:g}", f" + {row.offset:g}"
         handles = [entry(rf"$\sqrt{{2}}{shift}$", colour) for shift, (colour, _) in zip(shifts, _CURVES, strict=True)]
-        left.legend(handles=handles, loc="upper right", title=r"$\chi_B$", handlelength=1.4)
+        main.legend(handles=handles, loc="upper right", title=r"$\chi_B$", handlelength=1.4)
     for ax in axes[-1]:
         ax.set_xlabel(r"$\mathrm{Re}\,s$")
     key = [handle for ax in axes.flat for handle in ax.get_legend_handles_labels()[0]]
@@ -79,25 +82,25 @@ def root_locus_figure() -> Figure:
 
 
 def full_window(row: LocusRow) -> Window:
-    """The circle and the multiple roots; roots that run far out for large values leave it."""
+    """A window with the circle and the multiple roots; roots that become large lie outside."""
     return abs(row.bicycle.omega0) * np.array([-2.4, 1.9, -1.6, 1.6])
 
 
 def _zoom_window(row: LocusRow) -> Window:
-    """A window of the shape of `full_window` around the exceptional points in Re s < 0, Im s ≥ 0."""
+    """A window around the exceptional points in Re s < 0, Im s ≥ 0, with the shape of `full_window`."""
     x, y = np.array([(r.re, r.im) for r in row.loci[0].multiple if r.im >= 0]).T
     size = abs(row.bicycle.omega0)
-    half = max(np.ptp(x) / 2 + 0.22 * size, 0.36 * size)
-    tall = half * 3.2 / 4.3
+    half_width = max(np.ptp(x) / 2 + 0.22 * size, 0.36 * size)
+    half_height = half_width * 3.2 / 4.3
     middle = (x.min() + x.max()) / 2
-    return np.array([middle - half, middle + half, y.max() - tall, y.max() + tall])
+    return np.array([middle - half_width, middle + half_width, y.max() - half_height, y.max() + half_height])
 
 
 def draw_arrows(ax: Axes, points: Array, count: int, colour: str) -> None:
-    """Arrow heads spread evenly over the part of a curve that the axes show, none on a short one."""
+    """Draw arrow heads at equal distances on the visible part of a curve; a short part has none."""
     low, high = np.transpose([ax.get_xlim(), ax.get_ylim()])
-    seen = np.all((points[1:] > low) & (points[1:] < high), axis=1)
-    length = np.cumsum(seen * np.linalg.norm(np.diff(points, axis=0) / (high - low), axis=1))
+    is_visible = np.all((points[1:] > low) & (points[1:] < high), axis=1)
+    length = np.cumsum(is_visible * np.linalg.norm(np.diff(points, axis=0) / (high - low), axis=1))
     if length.size and length[-1] > 0.12:
         count = count if length[-1] > 0.4 else 1
         for k in np.searchsorted(length, length[-1] * (np.arange(count) + 0.5) / count):

@@ -1,4 +1,4 @@
-"""The planes of the paper, with boundaries, the EP set and the laws, and the swallowtail surface that they cut."""
+"""Figures of planes of the paper, with boundaries, the EP set and the laws, and of the swallowtail surface."""
 
 from collections.abc import Sequence
 
@@ -18,13 +18,13 @@ from tmsopt.plots.trace import draw_branch
 from tmsopt.records import Array
 from tmsopt.tracing.swallowtail import Swallowtail
 
-_LAWS = {
+_LAW_STYLES = {
     "Frc1": (r"$\mathrm{Fr}_c$ (Frc1)", CRITICAL, "-"),
     "epset": ("EP set (epset)", HEAVY, "-"),
     "tls": (r"$\tan\lambda_s$ (tls)", LINE, ":"),
     "chib1": (r"$\chi_B$ (chib1)", LINE, ":"),
 }
-"""Words, colour and line of each law over the colours of the abscissa."""
+"""Label, colour and line style of each law in the figure of the abscissa."""
 
 _ON_LAW = (r"(a) $\chi_B = \sqrt{2}$", r"(b) $\lambda_s = \lambda_s^{\mathrm{EP}_4} = 0.4107$ rad")
 
@@ -32,12 +32,12 @@ _LIGHT = np.array([0.3, -0.6, 0.75])
 
 
 def ep_set_figure() -> Figure:
-    """Stability and heavy damping with the EP set, on the laws."""
+    """Stability and heavy damping with the EP set, for designs on the laws."""
     return _planes_figure([tilt_plane(), chi_B_plane()], _ON_LAW)
 
 
 def off_law_figure() -> Figure:
-    """The same beside the laws."""
+    """Stability and heavy damping with the EP set, for designs near the laws."""
     titles = [
         rf"(a) $\chi_B = \sqrt{{2}} {OFF_LAW_CHI_B:+g}$",
         rf"(b) $\lambda_s = \lambda_s^{{\mathrm{{EP}}_4}} {OFF_LAW_TILT:+g}$ rad",
@@ -46,27 +46,27 @@ def off_law_figure() -> Figure:
 
 
 def abscissa_figure() -> Figure:
-    """The abscissa over both planes, with the laws."""
+    """The abscissa in both planes, with the laws."""
     figure = new_figure(10.4, 4.4)
-    panels, named = figure.subplots(1, 2), []
+    panels, axes_names = figure.subplots(1, 2), []
     for ax, make, title in zip(panels, (tilt_plane, chi_B_plane), _ON_LAW, strict=True):
         plane = make(points=(480, 360), boundaries=False)
         draw_layer(ax, plane.chart, plane_of(plane.chart), "abscissa")
         for law, place in plane.laws.items():
-            words, colour, style = _LAWS[law]
+            words, colour, style = _LAW_STYLES[law]
             ax.plot(*place, style, color=colour, label=words)
-        named.append((ax, _draw_marked(ax, plane)))
+        axes_names.append((ax, _draw_marked(ax, plane)))
         ax.legend(loc="upper left")
         ax.set_title(title)
-    place_all(named)
+    place_all(axes_names)
     return figure
 
 
 def draw_swallowtail(data: Swallowtail, ax: Axes3D | None = None) -> Axes3D:
-    """The discriminant surface of a design with its edges.
+    """Draw the discriminant surface of a design with its edges.
 
-    The Axes show three parameters (rad, SI): patches sorted by depth as one collection, so that nothing is drawn
-    through, cuspidal edges (EP3) and self-intersection (2EP2, CEP2) on top.
+    The Axes show three parameters (rad, SI). All patches are one collection, which is sorted by depth, so that near
+    patches hide distant ones. Cuspidal edges (EP3) and the self-intersection (2EP2, CEP2) are drawn on top.
 
     Example:
         >>> surface = tmsopt.swallowtail("problems/ep_set.toml", rows=4, across=3, starts=4)
@@ -90,31 +90,38 @@ def draw_swallowtail(data: Swallowtail, ax: Axes3D | None = None) -> Axes3D:
     lines = (data.cusps, "EP3", LINE, "-"), (data.crossing, "2EP2", REAL, "-"), (data.crossing, "CEP2", COMPLEX, "--")
     for trace, kind, colour, style in lines:
         for branch in trace.branches:
-            here = np.isin(branch.kinds, (kind, "EP4"))
-            columns = [np.where(here, branch.parameters[n], np.nan) for n in data.axes]
+            has_kind = np.isin(branch.kinds, (kind, "EP4"))
+            columns = [np.where(has_kind, branch.parameters[n], np.nan) for n in data.axes]
             ax.plot(*columns, style, color=colour, linewidth=1.8, zorder=9)
     for event in data.crossing.events:
         if event.name == "EP4":
             place = np.array([event.parameters[n] for n in data.axes])
             ax.plot(*place[:, None], "o", color=MARK, zorder=10)
             ax.text(*place[:2], place[2] + 0.05 * width[2], "EP4", fontsize=9, zorder=11)
-    of = data.problem.posed.parameter_set
+    parameters = data.problem.posed.parameter_set
     for letter, name, ends in zip("xyz", data.axes, ranges, strict=True):
-        ax.set(**{f"{letter}lim": ends, f"{letter}label": f"${of[name].latex}$"})
+        ax.set(**{f"{letter}lim": ends, f"{letter}label": f"${parameters[name].latex}$"})
         # ticks of two axes must not meet at their corner
         getattr(ax, f"{letter}axis").set_major_locator(MaxNLocator(4, prune="both"))
     return ax
 
 
 def quadrilaterals(points: Array) -> Array:
-    """Faces of a grid of points: shape (rows, columns, 3) in, (faces, 4, 3) out, those that exist."""
+    """Faces of a grid of points without those that have a nan.
+
+    Args:
+        points: shape (rows, columns, 3).
+
+    Returns:
+        The corners of the faces, shape (faces, 4, 3).
+    """
     corners = np.stack([points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]], axis=2)
     faces = corners.reshape(-1, 4, 3)
     return faces[np.all(np.isfinite(faces), axis=(1, 2))]
 
 
 def swallowtail_figure() -> Figure:
-    """The surface and its cross-sections, two by two."""
+    """The surface and three cross-sections."""
     figure = new_figure(10.0, 9.0)
     ax = figure.add_subplot(2, 2, 1, projection="3d", computed_zorder=False)
     draw_swallowtail(surface(), ax)
@@ -133,13 +140,13 @@ def swallowtail_figure() -> Figure:
         rf"({letter}) $\mathrm{{Fr}} = \mathrm{{Fr}}_{{\mathrm{{EP}}_4}}{f' {offset:+g}' if offset else ''}$"
         for letter, offset in zip("bcd", SECTIONS, strict=True)
     ]
-    flat = [figure.add_subplot(2, 2, k) for k in (2, 3, 4)]
-    draw_planes(figure, flat, [section(offset) for offset in SECTIONS], titles)
+    panels = [figure.add_subplot(2, 2, k) for k in (2, 3, 4)]
+    draw_planes(figure, panels, [section(offset) for offset in SECTIONS], titles)
     return figure
 
 
 def draw_plane(ax: Axes, plane: Plane) -> Legend:
-    """Classes, exact boundaries with corners, the EP set and the marked points of a plane; names, legend entries."""
+    """Draw classes, exact boundaries with corners, the EP set and the marked points of a plane."""
     axes = plane_of(plane.chart)
     names, handles = draw_layer(ax, plane.chart, axes, "kind")
     if plane.ep_set is not None:
@@ -150,19 +157,19 @@ def draw_plane(ax: Axes, plane: Plane) -> Legend:
 
 
 def _planes_figure(planes: Sequence[Plane], titles: Sequence[str]) -> Figure:
-    """Planes side by side."""
+    """Two planes, one beside the other."""
     figure = new_figure(9.6, 5.0)
     draw_planes(figure, figure.subplots(1, 2), planes, titles)
     return figure
 
 
 def draw_planes(figure: Figure, panels: Sequence[Axes], planes: Sequence[Plane], titles: Sequence[str]) -> None:
-    """Planes with their titles, one legend for all, and their names."""
-    drawn = [draw_plane(ax, plane) for ax, plane in zip(panels, planes, strict=True)]
+    """Draw planes with their titles and names, and one legend for all."""
+    legends = [draw_plane(ax, plane) for ax, plane in zip(panels, planes, strict=True)]
     for ax, title in zip(panels, titles, strict=True):
         ax.set_title(title)
-    legend_below(figure, [entry for _, entries in drawn for entry in entries])
-    place_all([(ax, names) for ax, (names, _) in zip(panels, drawn, strict=True)])
+    legend_below(figure, [entry for _, entries in legends for entry in entries])
+    place_all([(ax, names) for ax, (names, _) in zip(panels, legends, strict=True)])
 
 
 def _draw_marked(ax: Axes, plane: Plane) -> list[Name]:
@@ -173,7 +180,7 @@ def _draw_marked(ax: Axes, plane: Plane) -> list[Name]:
 
 
 def _shade_faces(faces: Array, colour: str) -> Array:
-    """The colour of each face, darker where it turns away from the light on either side."""
+    """The colour of each face; it is darker if the light does not meet the face at a right angle, on either side."""
     normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     facing = np.abs(normal @ (_LIGHT / np.linalg.norm(_LIGHT))) / np.where(length > 0, length, 1)[:, 0]

@@ -1,4 +1,8 @@
-"""Paths of the designs of Table 1 in the universal chart of quartics, drawn into Axes that the caller made."""
+"""Draw the paths of the designs of Table 1 in the universal chart of quartics.
+
+The chart has the coordinates A1, A2, A3 of the quartic s⁴ + A1 s³ + A2 s² + A3 s + 1, to which every quartic with
+a4/a0 > 0 can be scaled.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,23 +18,24 @@ from tmsopt.plots.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, STABL
 from tmsopt.records import Array
 
 _COLOURS = (LINE, CRITICAL, MARK)
-"""Paths, in the order given."""
+"""Colours of the paths, in the order of Table 1."""
 
-_EDGE = "#8a5a00"
+_EDGE_COLOUR = "#8a5a00"
 
 _LIMIT, _LOW, _HIGH = 8.0, -3.0, 18.0
-"""Largest A1 and A3 shown; limits of A2."""
+"""Upper limit of A1 and A3 in the figures, and both limits of A2."""
 
 
 def draw_box(ax: Axes3D, paths: Sequence[UniversalPath], faces: Sequence[Array]) -> None:
-    """The spire of heavy damping, the EP set and the paths in the space (A1, A3, A2)."""
+    """Draw the spire (the region of heavy damping), the EP set and the paths in the space (A1, A3, A2)."""
     ax.computed_zorder = False
     for face in faces:
         x, z, y = np.moveaxis(face, -1, 0)
         ax.plot_surface(x, y, z, color=HEAVY, alpha=0.75, linewidth=0, rcount=41, ccount=41, shade=False, zorder=2)
         for side in (face[:, 0], face[:, -1], face[-1]):
-            ax.plot(*side.T[[0, 2, 1]], color=_EDGE, linewidth=0.9, zorder=3)
-    # A2 = A1/A3 + A3/A1, above which all is stable, as the lines through (0, 0) that it consists of
+            ax.plot(*side.T[[0, 2, 1]], color=_EDGE_COLOUR, linewidth=0.9, zorder=3)
+    # The boundary of stability, A2 = A1/A3 + A3/A1, consists of horizontal lines through A1 = A3 = 0. All quartics
+    # above it are stable.
     k, r = np.meshgrid(np.linspace(-1.5, 1.5, 31), np.linspace(0.02, 1, 9))
     x, y = (_LIMIT * r * np.exp(np.minimum(side, 0)) for side in (k, -k))
     ax.plot_surface(x, y, 2 * np.cosh(k), color=STABLE, alpha=0.2, linewidth=0.3, edgecolor="#3b8fbf", shade=False)
@@ -44,11 +49,11 @@ def draw_box(ax: Axes3D, paths: Sequence[UniversalPath], faces: Sequence[Array])
 
 
 def draw_section(ax: Axes, paths: Sequence[UniversalPath]) -> None:
-    """The plane A1 = A3: stability, heavy damping, the EP set, and the paths."""
-    above, a = "stable above $A_2 = A_1/A_3 + A_3/A_1$", np.linspace(4, _LIMIT, 200)
-    ax.fill_between([0, _LIMIT], 2, _HIGH, color=STABLE, alpha=0.18, linewidth=0, label=above)
+    """Draw the plane A1 = A3 with stability, heavy damping, the EP set and the paths."""
+    stable_label, a = "stable above $A_2 = A_1/A_3 + A_3/A_1$", np.linspace(4, _LIMIT, 200)
+    ax.fill_between([0, _LIMIT], 2, _HIGH, color=STABLE, alpha=0.18, linewidth=0, label=stable_label)
     ax.fill_between(a, *heavy_section(a), color=HEAVY, alpha=0.55, linewidth=0, label="heavy damping")
-    ax.plot(a, 2 * a - 2, color=_EDGE)
+    ax.plot(a, 2 * a - 2, color=_EDGE_COLOUR)
     ax.axhline(2, color=STABLE)
     ax.set(xlim=(0, _LIMIT), ylim=(_LOW, _HIGH), yticks=range(0, 16, 5), xlabel="$A_1 = A_3$", ylabel="$A_2$")
     for A, colour in zip(_draw_paths(ax, paths, [0, 1]), _COLOURS, strict=True):
@@ -66,35 +71,41 @@ def draw_section(ax: Axes, paths: Sequence[UniversalPath]) -> None:
 
 
 def universal_figure() -> Figure:
-    """The chart as a box and as the section A1 = A3."""
+    """The chart in three dimensions and its section A1 = A3."""
     figure, paths = new_figure(9.4, 5.0), table_1_paths()
     grid = figure.add_gridspec(1, 2, width_ratios=(1.1, 1))
-    left, right = figure.add_subplot(grid[0], projection="3d"), figure.add_subplot(grid[1])
-    draw_box(left, paths, spire_faces(_LIMIT))
-    draw_section(right, paths)
-    left.set_title("(a) every quartic with $a_4/a_0 > 0$, scaled")
-    right.set_title("(b) section $A_1 = A_3$")
-    legend_below(figure, right.get_legend_handles_labels()[0], 4)
+    box_axes, section_axes = figure.add_subplot(grid[0], projection="3d"), figure.add_subplot(grid[1])
+    draw_box(box_axes, paths, spire_faces(_LIMIT))
+    draw_section(section_axes, paths)
+    box_axes.set_title("(a) every quartic with $a_4/a_0 > 0$, scaled")
+    section_axes.set_title("(b) section $A_1 = A_3$")
+    legend_below(figure, section_axes.get_legend_handles_labels()[0], 4)
     return figure
 
 
 def _draw_paths(ax: Any, paths: Sequence[UniversalPath], columns: list[int]) -> list[Array]:
-    """The EP set and the paths in some columns of (A1, A2, A3), with where stability begins and the exceptional point.
+    """Draw the EP set and the paths, and mark on each path the beginning of stability and the exceptional point.
+
+    Args:
+        columns: the coordinates to draw, as indices of (A1, A2, A3).
 
     Returns:
-        The points of each path that the axes show; a 3-D plot does not clip.
+        The visible points of each path; a 3-D plot does not clip curves itself.
     """
     for low, high, name, colour, style in ((0.0, 4.0, "CEP2", COMPLEX, "--"), (4.0, _LIMIT, "2EP2", REAL, "-")):
         points = ep_set(np.linspace(low, high, 100))[:, columns]
         ax.plot(*points.T, style, color=colour, linewidth=2.0, zorder=4, gid="ep-set", label=NAMES[name])
-    shown = []
+    visible_paths = []
     for path, colour in zip(paths, _COLOURS, strict=True):
         inside = np.all((path.A <= (_LIMIT, _HIGH, _LIMIT)) & (path.A[:, 1:2] >= _LOW), axis=1)
-        shown.append(path.A[inside][:, columns])
+        visible_paths.append(path.A[inside][:, columns])
         label = rf"{NAMES[path.name]} of Table 1, $\lambda_s = {path.tilt:.4f}$"
-        ax.plot(*shown[-1].T, color=colour, gid="path", zorder=5, label=label)
-        fill, begins = COMPLEX if path.name == "CEP2" else REAL, r"$\mathrm{Fr}$ where stability begins"
-        marks = ("D", "white", path.stable, "stable", begins), ("o", fill, path.exceptional, path.name, "on the EP set")
-        for marker, inner, at, name, label in marks:
-            ax.plot(*at[columns, None], marker, mfc=inner, mec=colour, zorder=6, gid=name, label=label)
-    return shown
+        ax.plot(*visible_paths[-1].T, color=colour, gid="path", zorder=5, label=label)
+        fill, stable_label = COMPLEX if path.name == "CEP2" else REAL, r"$\mathrm{Fr}$ where stability begins"
+        marks = (
+            ("D", "white", path.stable, "stable", stable_label),
+            ("o", fill, path.exceptional, path.name, "on the EP set"),
+        )
+        for marker, marker_fill, place, name, label in marks:
+            ax.plot(*place[columns, None], marker, mfc=marker_fill, mec=colour, zorder=6, gid=name, label=label)
+    return visible_paths
