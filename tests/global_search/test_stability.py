@@ -26,7 +26,7 @@ def problem(coefficients, free, **asked):
 
 def find_damped(most, known=None, **asked):
     """A stable design of s² + (x − 2) s + 1 with x up to `most`."""
-    return find_stable_design(problem(DAMPED, {"x": (0, most)}, **asked), SECONDS, known=known)
+    return find_stable_design(problem(DAMPED, {"x": (0, most)}, **asked), SECONDS, known_design=known)
 
 
 @scip
@@ -47,7 +47,7 @@ def find_damped(most, known=None, **asked):
 def test_boxes_without_a_stable_design(coefficients, free, asked):
     stated = problem(coefficients, free, **asked)
     for known in (None, stated.ordered({n: hi for n, (_, hi) in free.items()})):
-        assert find_stable_design(stated, SECONDS, known=known).any is False
+        assert find_stable_design(stated, SECONDS, known_design=known).any is False
 
 
 @scip
