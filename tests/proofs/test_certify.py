@@ -257,25 +257,16 @@ def test_a_bound_on_the_roots_that_is_too_small(slowest, monkeypatch):
     check_unclaimed(slowest, "x1.0")
 
 
-def test_a_wrong_equation(slowest, monkeypatch):
-    """c3 + x c1 = 0 for c3 − x c1 = 0: no x for positive coefficients."""
-    right = interlaces.interlacing_conditions
-
-    def wrong(coefficients, squares):
-        ((x, y),) = squares
-        return [coefficients[3] * y + x * coefficients[1]], right(coefficients, squares)[1]
-
-    monkeypatch.setattr(interlaces, "interlacing_conditions", wrong)
-    check_unclaimed(slowest, "abscissa")
-
-
-@pytest.mark.parametrize("which", [0, 1, 2, 3])
-def test_a_wrong_sign(slowest, monkeypatch, which):
-    """Of one coefficient of p(t − 0.2)."""
+@pytest.mark.parametrize("which", [None, 0, 1, 2, 3])
+def test_a_wrong_condition(slowest, monkeypatch, which):
+    """The equation c3 + x c1 = 0 for c3 − x c1 = 0, or the sign of one coefficient of p(t − 0.2)."""
     right = interlaces.interlacing_conditions
 
     def wrong(coefficients, squares):
         equations, nonnegative = right(coefficients, squares)
+        if which is None:
+            ((x, y),) = squares
+            equations = [coefficients[3] * y + x * coefficients[1]]
         return equations, [-e if k == which else e for k, e in enumerate(nonnegative)]
 
     monkeypatch.setattr(interlaces, "interlacing_conditions", wrong)

@@ -2,7 +2,6 @@
 
 import math
 from fractions import Fraction
-from functools import cache
 from importlib import import_module
 from itertools import product as every
 
@@ -47,14 +46,6 @@ def omega0(problem):
     return omega0_bound(problem.posed, math.inf).value
 
 
-@cache
-def two_mass_spring():
-    """(s⁴ + 2s²)(x0 + x1 s + s²) + y0 + y1 s + y2 s²."""
-    x0, x1, y0, y1, y2 = symbols("x0 x1 y0 y1 y2")
-    model = from_coefficients([1, x1, x0 + 2, 2 * x1, 2 * x0 + y2, y1, y0])
-    return solve(boxed(model, -10.0, 10.0))
-
-
 def holds(found, truth):
     return bool(abs(mpf(found.value) - truth) <= mpf(found.radius) + mpf(10) ** (5 - mp.dps))
 
@@ -74,7 +65,9 @@ def rebuilt(proof):
 
 def test_the_two_mass_spring_controller_is_optimal_and_its_6_fold_root_exists():
     """The published optimum −√15/5; (s + √15/5)⁶ gives x1 = 6r, x0 = 15r² − 2, y2 = 15r⁴ − 2x0, y1 = 6r⁵, y0 = r⁶."""
-    design = two_mass_spring()
+    x1, x0, y2, y1, y0 = symbols("x1 x0 y2 y1 y0")
+    model = from_coefficients([1, x1, x0 + 2, 2 * x1, 2 * x0 + y2, y1, y0])  # (s⁴ + 2s²)(x0 + x1 s + s²) + y0 + …
+    design = solve(boxed(model, -10.0, 10.0))
     assert (design.structure, design.bound.method, design.bound.proven) == ("EP6", "relation", True)
     assert design.bound.value <= -R6 <= design.bound.value + 4e-16
     proof = prove(design)

@@ -66,22 +66,21 @@ def find_stable_design(
     if not SOLVER.available or not problem.free:
         return Stability()
     constraints = {n: text for n, text in problem.constraints.items() if n not in problem.asked_of_roots}
-    relaxed_problem = problem.derive(minimize="abscissa", maximize=None, pareto=(), constraints=constraints)
-    best_evaluation = _recheck_point(
-        relaxed_problem, {n: known_design[n] for n in problem.free} if known_design else default_start(problem)
+    relaxation = problem.derive(minimize="abscissa", maximize=None, pareto=(), constraints=constraints)
+    best = _recheck_point(
+        relaxation, {n: known_design[n] for n in problem.free} if known_design else default_start(problem)
     )
-    unit = typical_size(best_evaluation.structure.roots)
-    axis_question = Question(relaxed_problem, relaxed_problem.cases, 0.0, unit)
+    unit = typical_size(best.structure.roots)
+    axis_question = Question(relaxation, relaxation.cases, 0.0, unit)
     with SolverPool(SOLVER) as pool:
         clock = Clock(seconds, pool, progress)
         try:
             reply = answer_question(axis_question, clock, _SHARE, _ACCEPT_ANY)
             is_proved = reply.verdict == INFEASIBLE
-            if is_proved and known_design is not None and not best_evaluation.violations:
-                is_proved = _is_admitted(axis_question, best_evaluation, known_design, clock)
-            if (
-                reply.verdict == FOUND and _judge_point(relaxed_problem, reply.point).design is None
-            ):  # its roots are on the axis
+            if is_proved and known_design is not None and not best.violations:
+                is_proved = _is_admitted(axis_question, best, known_design, clock)
+            # A point with roots on the axis does not decide the question.
+            if reply.verdict == FOUND and _judge_point(relaxation, reply.point).design is None:
                 reply = answer_question(replace(axis_question, limit=-_MARGIN * unit), clock, 1.0, _ACCEPT_ANY)
         except UnsupportedOperation:
             return Stability()
@@ -90,7 +89,7 @@ def find_stable_design(
     if clock.interrupted:
         raise KeyboardInterrupt
     method_text = f"in floating-point arithmetic, by {SOLVER.name}, feasibility tolerance {SOLVER.tolerance:.0e}"
-    return Stability(False, proof=method_text) if is_proved else _judge_point(relaxed_problem, reply.point)
+    return Stability(False, proof=method_text) if is_proved else _judge_point(relaxation, reply.point)
 
 
 def _recheck_point(problem: Posed, design: Mapping[str, float]) -> Evaluation:
@@ -99,18 +98,15 @@ def _recheck_point(problem: Posed, design: Mapping[str, float]) -> Evaluation:
 
 def _judge_point(problem: Posed, design: Mapping[str, float] | None) -> Stability:
     """The verdict on a point that the solver found."""
-    if (
-        design is None
-        or not max((evaluation := _recheck_point(problem, design)).structure.abscissa, evaluation.realised) < 0
-    ):
-        return Stability()
-    return Stability(None if evaluation.violations else True, design)
+    if design is not None:
+        evaluation = _recheck_point(problem, design)
+        if max(evaluation.structure.abscissa, evaluation.realised) < 0:
+            return Stability(None if evaluation.violations else True, design)
+    return Stability()
 
 
-def _is_admitted(
-    question: Question, best_evaluation: Evaluation, known_design: Mapping[str, float], clock: Clock
-) -> bool:
+def _is_admitted(question: Question, best: Evaluation, known_design: Mapping[str, float], clock: Clock) -> bool:
     """Whether the question and the solver admit a known design, for a line just right of its roots."""
     design = {n: known_design[n] for n in question.problem.free}
-    wider_question = replace(question, limit=best_evaluation.structure.abscissa + _MARGIN * question.unit)
+    wider_question = replace(question, limit=best.structure.abscissa + _MARGIN * question.unit)
     return not find_exclusion(wider_question, design) and not is_excluded_by_solver(wider_question, design, clock)

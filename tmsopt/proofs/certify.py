@@ -75,20 +75,17 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | Non
             begin(steps, "bounding the optimum", "s")
             has_better = True
             while has_better and not (problem.objective is None and is_feasible(solution)):
-                solution, has_better = (_bound_feasible if is_feasible(solution) else _prove_infeasible)(
-                    solution, clock
-                )
+                take_step = _bound_feasible if is_feasible(solution) else _prove_infeasible
+                solution, has_better = take_step(solution, clock)
         except UnsupportedOperation as error:
             return _note_failure(solution, f"no bound: branch and bound does not support {error}")
         except SolverFailed as error:
             return _note_failure(solution, f"{SOLVER.name} failed: {error}; there is no bound")
         except KeyboardInterrupt:
             clock.interrupted = True
-        return (
-            replace(_add_note(solution, "the proof was interrupted"), interrupted=True)
-            if clock.interrupted
-            else solution
-        )
+        if clock.interrupted:
+            solution = replace(_add_note(solution, "the proof was interrupted"), interrupted=True)
+        return solution
 
 
 def check_installed() -> None:
@@ -116,18 +113,16 @@ def _bound_feasible(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     while (level := _next_level(proved_level, failed_level, has_converged)) is not None and clock.seconds_left > 0:
         share = 1.0 if level in (_FINE_LEVEL, _COARSE_LEVELS[-1]) else _SHARE
         clock.note = _progress_note(design, min(known_bound.gap, _gap(design.value, proved_level)), level)
-        reply = answer_question(
-            _pose_question(design, level), clock, share, partial(confirm_point, design, _cases(design))
-        )
+        confirm = partial(confirm_point, design, _cases(design))
+        reply = answer_question(_pose_question(design, level), clock, share, confirm)
         if reply.better is not None:
             return reply.better, True
         if reply.verdict == INFEASIBLE:
             proved_level = level
         else:
             failed_level = level
-    return replace(
-        design, bound=_stronger_bound(design, known_bound, _proved_bound(design, proved_level, clock))
-    ), False
+    bound = _stronger_bound(design, known_bound, _proved_bound(design, proved_level, clock))
+    return replace(design, bound=bound), False
 
 
 def _progress_note(design: Solution, gap: float, level: float) -> str:
@@ -158,15 +153,15 @@ def _prove_infeasible(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     if design.bound.proven:
         return design, False
     clock.note = "looking for a feasible design"
-    reply = answer_question(_pose_question(design, None), clock, 1.0, partial(confirm_point, design, _cases(design)))
+    problem, cases = design.problem.posed, _cases(design)
+    reply = answer_question(_pose_question(design, None), clock, 1.0, partial(confirm_point, design, cases))
     if reply.better is not None:
         return reply.better, True
     if reply.verdict == INFEASIBLE:
-        if not recheck(design.problem.posed, design.parameters, _cases(design)).violations:
-            return _note_failure(
-                design, f"no proof: {SOLVER.name}'s relaxation excludes a known feasible design"
-            ), False
-        bound = _search_bound(design.problem.posed.sign * math.inf, 0.0, True, clock)
+        if not recheck(problem, design.parameters, cases).violations:
+            reason = f"no proof: {SOLVER.name}'s relaxation excludes a known feasible design"
+            return _note_failure(design, reason), False
+        bound = _search_bound(problem.sign * math.inf, 0.0, True, clock)
         return replace(design, status="infeasible", bound=bound), False
     note = "branch and bound did not decide in time whether any design is feasible"
     return _add_note(replace(design, bound=_proved_bound(design, math.inf, clock)), note), False
@@ -174,14 +169,15 @@ def _prove_infeasible(design: Solution, clock: Clock) -> tuple[Solution, bool]:
 
 def _instant_bound(design: Solution) -> Bound:
     """Compute the bound without a search again; a damping ratio is at most 1, a frequency at least 0."""
-    if design.problem.posed.sense == "maximize" and (design.problem.maximize or "").strip() == "damping_ratio":
-        gap = max(1.0 - design.value, 0.0)
+    problem, value = design.problem.posed, design.value
+    if problem.sign < 0 and problem.goal == "damping_ratio":
+        gap = max(1.0 - value, 0.0)
         return Bound(1.0, gap, gap == 0, "definition")
-    objective, text = design.problem.posed.objective, (design.problem.minimize or "").strip()
+    is_frequency = problem.sign > 0 and problem.goal in (ANGULAR_FREQUENCY, "frequency")
     # A model may have a parameter called frequency.
-    if text in (ANGULAR_FREQUENCY, "frequency") and objective and ANGULAR_FREQUENCY in objective.names:
-        return Bound(0.0, design.value, design.value == 0, "definition")
-    bound = instant_bound(design.problem.posed, design.value)
+    if is_frequency and problem.objective and ANGULAR_FREQUENCY in problem.objective.names:
+        return Bound(0.0, value, value == 0, "definition")
+    bound = instant_bound(problem, value)
     return bound if math.isfinite(bound.value) else _interval_bound(design)
 
 
@@ -193,15 +189,17 @@ def _interval_bound(design: Solution) -> Bound:
     build = Builder(problem, _cases(design))
     build.add_objective()
     lower, upper = build.enclose([build.objective])[0]  # of the negative objective if it is maximised
-    sense = problem.sign
-    gap = max(sense * design.value - lower, 0.0)
-    return Bound(sense * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()
+    gap = max(problem.sign * design.value - lower, 0.0)
+    return (
+        Bound(problem.sign * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()
+    )
 
 
 def _pose_question(design: Solution, level: float | None) -> Question:
     """Ask whether any design is better by a gap of this level; None asks whether any design is feasible."""
-    limit = None if level is None else design.value - design.problem.posed.sign * _gap(design.value, level)
-    return Question(design.problem.posed, _cases(design), limit, typical_size(design.of_polynomial.roots))
+    problem = design.problem.posed
+    limit = None if level is None else design.value - problem.sign * _gap(design.value, level)
+    return Question(problem, _cases(design), limit, typical_size(design.of_polynomial.roots))
 
 
 def _proved_bound(design: Solution, level: float, clock: Clock) -> Bound:
@@ -213,6 +211,7 @@ def _proved_bound(design: Solution, level: float, clock: Clock) -> Bound:
 
 
 def _search_bound(value: float, gap: float, proven: bool, clock: Clock) -> Bound:
+    """A bound with the solver, its time and its nodes."""
     name = SOLVER.name
     return Bound(value, gap, proven, name.lower(), clock.seconds_used, clock.nodes, SOLVER.tolerance, name)
 
@@ -226,6 +225,7 @@ def _stronger_bound(design: Solution, known_bound: Bound, search_bound: Bound) -
 
 
 def _gap(value: float, level: float) -> float:
+    """The absolute gap of a level."""
     return level * max(MIN_SIZE, abs(value))
 
 

@@ -109,7 +109,7 @@ def _search_nearby(
     free_names = [n for n in problem.free if n not in {s.removeprefix("tan(").removesuffix(")") for s in design.stated}]
     reasons: list[str] = []
     for candidates in _parameter_choices(problem, stored_values, free_names, system.conditions):
-        for unknowns in _starts(system, exact_values, problem):
+        for unknowns in _start_values(system, exact_values):
             start = {**exact_values, **unknowns}
             try:
                 return _prove_from(system, start, candidates, digits)
@@ -132,9 +132,9 @@ def _parameter_choices(
         yield free_names
 
 
-def _starts(system: Equations, exact_values: Mapping[str, Any], problem: Posed) -> Iterator[dict[str, Any]]:
+def _start_values(system: Equations, exact_values: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield start values of the unknowns, from the nearest polynomials of the pattern and the quantities' values."""
-    parameter_set = problem.parameter_set
+    problem, parameter_set = system.problem, system.problem.parameter_set
     parameters = {
         n: float(exact_values[n].atan()) if parameter_set[n].tangent else float(exact_values[n])
         for n in parameter_set.names
@@ -154,8 +154,7 @@ def _starts(system: Equations, exact_values: Mapping[str, Any], problem: Posed) 
 
 def _prove_from(system: Equations, start: Mapping[str, Any], candidates: list[str], digits: int) -> ProvedDesign:
     """Prove a design from start values of all parameters and unknowns."""
-    problem, pattern = system.problem, system.pattern
-    parameter_set = problem.parameter_set
+    parameter_set = system.problem.parameter_set
     choice = choose_moved(system, start, candidates)
     names = [*choice.moved, *system.unknowns]
     middle = refine_solution(system, start, names, digits, system.units)
@@ -164,7 +163,7 @@ def _prove_from(system: Equations, start: Mapping[str, Any], candidates: list[st
     distance, explained = _measure_distance(choice, start, enclosure, system.units)
     tangents = {n: at[n] for n in parameter_set.names if parameter_set[n].tangent}
     parameters = {n: at[n].atan() if n in tangents else at[n] for n in parameter_set.names}
-    coefficients = problem.model.coefficients(parameters, parameter_set)
+    coefficients = system.problem.model.coefficients(parameters, parameter_set)
     unknowns = [at[n] for n in system.pattern_unknowns]
     _check_solution(system, coefficients, at)
     return ProvedDesign(
@@ -173,7 +172,7 @@ def _prove_from(system: Equations, start: Mapping[str, Any], candidates: list[st
         parameters,
         tangents,
         {n: at[n] for n in system.unknowns},
-        factor_pattern(pattern, unknowns),
+        factor_pattern(system.pattern, unknowns),
         choice.moved,
         enclosure.uniqueness * min((system.units.get(n, 1.0) for n in names), default=1.0),
         largest_radius([at[n] for n in names]),

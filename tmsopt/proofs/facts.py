@@ -32,6 +32,7 @@ class Verdict:
 
 NOT_CHECKED = Verdict()
 
+# A root, several roots, the unstable side, the stable side, and the stable side in short.
 _ROOT_WORDS = "a root", "roots", "right of the imaginary axis", "left of the imaginary axis", "left of the axis"
 _EIGENFREQUENCY_WORDS = (
     "an eigenfrequency",

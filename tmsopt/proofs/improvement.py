@@ -47,7 +47,7 @@ def confirm_point(design: Solution, cases: Sequence[Case], point: Mapping[str, f
         if is_feasible(candidate) and relative_gain(problem, known_value, candidate.value) > _MIN_GAIN:
             note = "branch and bound found a feasible design that the search from many starts missed"
             if known_value is not None:
-                old_value = unit_of(problem, problem.minimize or problem.maximize or "").show(known_value, 9)
+                old_value = unit_of(problem, problem.goal).show(known_value, 9)
                 note = f"branch and bound found a better design than the search from many starts: {old_value} before"
             note = next(
                 (old_note for old_note in design.notes if old_note.startswith("branch and bound found a ")), note

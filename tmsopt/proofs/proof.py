@@ -248,27 +248,25 @@ def _prove_first(
             return _assemble(problem, design, pattern.name, pattern, proved_design, digits)
     name = problem.locate or user_structure_name(problem.model, structure)
     expected_pattern = next((p for p in patterns if p.name == name), None)
-    stored = enclose_stored(problem, design)
-    if stored is None:
+    stored_design = enclose_stored(problem, design)
+    if stored_design is None:
         reason = reasons[0] if reasons else "a0 may be 0: a root may be at infinity"
         return Proof(_state_claim(name, expected_pattern), False, reason, name, digits=digits)
-    reasons = reasons or _simple_doubts(problem, structure, stored)
-    return _assemble(problem, design, name, expected_pattern, stored, digits, reasons, stored=True)
+    reasons = reasons or _simple_doubts(problem, structure, stored_design)
+    return _assemble(problem, design, name, expected_pattern, stored_design, digits, reasons, stored=True)
 
 
 def _candidate_patterns(problem: Posed, structure: str, roots: Sequence[Root]) -> list[Pattern]:
     """List the patterns to prove: those of the roots, if they imply the located pattern, and then the located one."""
-    located_pattern = problem.pattern
+    target = problem.pattern
     quartic = PATTERNS if problem.model.degree == _QUARTIC else {}
     patterns = find_patterns(roots) if roots else [quartic[structure]] if structure in quartic else []
-    if located_pattern and not (
-        has_pattern(roots, located_pattern.form) if roots else located_pattern.form == structure
-    ):
+    if target and not (has_pattern(roots, target.form) if roots else target.form == structure):
         patterns = []
     user_patterns = [quartic.get(p.name, p) for p in patterns]
     if problem.model.carrier is not None:
         user_patterns = [as_complex_pattern(p) for p in user_patterns]
-    return list({p.name: p for p in [*user_patterns, *([located_pattern] if located_pattern else [])]}.values())
+    return list({p.name: p for p in [*user_patterns, *([target] if target else [])]}.values())
 
 
 def _exact_patterns(problem: Posed, design: ExactDesign) -> list[Pattern]:
@@ -353,7 +351,7 @@ def _assemble(
 
 
 def _formula_numbers(problem: Posed) -> tuple[str, ...]:
-    """Texts of the non-integers in formulas."""
+    """The numbers in formulas that are not integers, as texts."""
     constants = [x for c in problem.conditions.values() if c.equality for x in c.formula.constants]
     texts = [text for x in constants if not (text := number_text(x)).lstrip("-").isdigit()]
     return tuple(dict.fromkeys([*problem.model.numbers, *texts]))
