@@ -19,7 +19,7 @@ from tmsopt.program.starts import initial_point
 from tmsopt.progress import Counts
 
 _ROW_TOLERANCE = 1e-6  # relative to a row's range: SCIP meets a row to 1e-9, but multiple roots have half the digits
-_NEARBY = 1e-4  # half the width of the box around a known design, relative to the range of each variable
+_HALF_WIDTH = 1e-4  # half the width of the box around a known design, relative to the range of each variable
 _MIN_RANGE = 1e-2  # relative to 1 + |x|: shorter ranges count as this long, since SCIP cannot resolve less
 _SHORT_SECONDS = 1.0  # time limit for a bound on a0, and for the box around a known design
 _FIRST_SECONDS = 2.0  # time limit of the first turn; each turn doubles it
@@ -178,7 +178,7 @@ def is_excluded_by_solver(question: Question, design: Mapping[str, float], clock
         near_box = tuple(
             (max(lo, x - d), min(hi, x + d))
             for x, lo, hi in zip(point, nlp.lower, nlp.upper, strict=False)
-            for d in [_NEARBY * max(hi - lo, _MIN_RANGE * (1 + abs(x)))]
+            for d in [_HALF_WIDTH * max(hi - lo, _MIN_RANGE * (1 + abs(x)))]
         )
         verdicts += [
             d.verdict for d in clock.race([make_task(nlp, min(_SHORT_SECONDS, clock.seconds_left), box=near_box)])

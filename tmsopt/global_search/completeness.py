@@ -175,15 +175,15 @@ class _ZeroSearch:
         """Collect the proved designs and the undecided places."""
         designs: list[tuple[Mapping[str, Any], str]] = []
         for zero in self.zeros:
-            at = {n: zero.enclosure.balls[n] for n in problem.free}
+            parameters = {n: zero.enclosure.balls[n] for n in problem.free}
             limit = _active_limits(zero)
-            if limit is not None and not any(all(at[n].overlaps(b[n]) for n in at) for b, _ in designs):
-                designs.append((at, limit))
+            if limit is not None and not any(all(parameters[n].overlaps(b[n]) for n in parameters) for b, _ in designs):
+                designs.append((parameters, limit))
         designs.sort(key=lambda pair: [float(x) for x in pair[0].values()])
         parameter_set = problem.parameter_set
         numbers = [
-            {n: number(x.atan() if parameter_set[n].tangent else x, _RESULT_DIGITS) for n, x in at.items()}
-            for at, _ in designs
+            {n: number(x.atan() if parameter_set[n].tangent else x, _RESULT_DIGITS) for n, x in parameters.items()}
+            for parameters, _ in designs
         ]
         places = _merge_undecided(problem, self.undecided)
         undecided = tuple(Undecided(_parameter_ranges(problem, box), reason) for box, reason in places)
@@ -205,10 +205,10 @@ def _add_zero(zeros: list[_Zero], system: PatternSystem, wide_box: Box, image_bo
     if any(_is_inside(image_box, proved_zero.unique_box) for proved_zero in zeros):
         return True
     zero = _prove_zero(system, image_box)
-    at = [(zero.enclosure.balls[n],) * 2 for n in system.names] if zero else []
-    if zero is None or not _is_inside(at, wide_box):
+    zero_box = [(zero.enclosure.balls[n],) * 2 for n in system.names] if zero else []
+    if zero is None or not _is_inside(zero_box, wide_box):
         return False
-    if not any(_is_inside(at, proved_zero.unique_box) for proved_zero in zeros):
+    if not any(_is_inside(zero_box, proved_zero.unique_box) for proved_zero in zeros):
         zeros.append(zero)
     return True
 
@@ -266,8 +266,8 @@ def _prove_zero(system: PatternSystem, box: Box) -> _Zero | None:
     except (ProofFailed, ZeroDivisionError, ValueError):
         return None
     distances = {n: enclosure.uniqueness * units.get(n, 1.0) for n in system.names}
-    near = [(middle[n] - r, middle[n] + r) for n, r in distances.items()]
-    return _Zero(system, enclosure, tuple((interval(lo)[1], interval(hi)[0]) for lo, hi in near))
+    unique_ranges = [(middle[n] - r, middle[n] + r) for n, r in distances.items()]
+    return _Zero(system, enclosure, tuple((interval(lo)[1], interval(hi)[0]) for lo, hi in unique_ranges))
 
 
 def _as_box(ends: Array) -> Box:
@@ -283,12 +283,12 @@ def _is_inside(box: Sequence[tuple[Any, Any]], outer_box: Box) -> bool:
 def _active_limits(zero: _Zero) -> str | None:
     """Name the limits on which a design lies to all digits computed, or empty; None if it violates a limit."""
     system, at = zero.system, zero.enclosure.balls
-    room: list[tuple[str, Any]] = []
+    margins: list[tuple[str, Any]] = []
     for name, (lo, hi) in zip(system.names, _unknown_ranges(system), strict=True):
         label = "" if name.startswith(":") else name
-        room += [(label and f"the least {label}", at[name] - lo), (label and f"the greatest {label}", hi - at[name])]
-    room += [("the edge of the pattern", x) for x in fold(system.nonnegative, at, BALLS)]
-    room += [("", x) for x in fold(system.ascending, at, BALLS)]
+        margins += [(label and f"the least {label}", at[name] - lo), (label and f"the greatest {label}", hi - at[name])]
+    margins += [("the edge of the pattern", x) for x in fold(system.nonnegative, at, BALLS)]
+    margins += [("", x) for x in fold(system.ascending, at, BALLS)]
     for name, condition in system.problem.conditions.items():
         if not condition.equality:
             excess = condition.sign * flint.arb(
@@ -298,10 +298,10 @@ def _active_limits(zero: _Zero) -> str | None:
                 middle = system.problem.ordered({n: float(at[n].mid()) for n in system.problem.free})
                 if not condition.violation(system.problem.values(middle)) <= 0:
                     return None
-            room.append((f"constraint {name}", -excess))
-    if any(x < 0 for _, x in room):
+            margins.append((f"constraint {name}", -excess))
+    if any(x < 0 for _, x in margins):
         return None
-    active_limits = [label for label, x in room if label and not x > 0]
+    active_limits = [label for label, x in margins if label and not x > 0]
     return ", ".join(active_limits + ["a0 = 0"] * flint.arb(fold(system.leading, at, BALLS)[0]).contains(0))
 
 

@@ -40,13 +40,13 @@ class Piece:
             ``line`` for a root on the imaginary axis.
         order: the power.
         outer: whether its roots are large, so that the factor is a polynomial in 1/s.
-        first: index of its first unknown.
+        first_index: index of its first unknown.
     """
 
     kind: str
     order: int
     outer: bool
-    first: int
+    first_index: int
 
     @property
     def ranges(self) -> tuple[Ends, ...]:
@@ -63,7 +63,7 @@ class Piece:
 
     def own_unknowns(self, unknowns: Sequence[Any]) -> Sequence[Any]:
         """Its unknowns among all unknowns."""
-        return unknowns[self.first : self.first + len(self.ranges)]
+        return unknowns[self.first_index : self.first_index + len(self.ranges)]
 
     def monic(self, unknowns: Sequence[Any]) -> list[Any]:
         """Coefficients of the monic factor, in s or 1/s, descending."""
@@ -243,9 +243,9 @@ def build_system(
     unknowns = tuple(f":{k}" for k in range(sum(len(p.ranges) for p in pieces)))
     names = (*problem.free, *(q.name for q in lifted), *unknowns)
     at = {n: symbol(n) for n in names}
-    u = [at[n] for n in unknowns]
+    pattern_unknowns = [at[n] for n in unknowns]
     values = values_at(problem, lifted, at, problem.as_nodes(problem.fixed))
-    if (abscissa := _abscissa(problem, pieces, scale, u)) is not None:
+    if (abscissa := _abscissa(problem, pieces, scale, pattern_unknowns)) is not None:
         values = values.with_known({"abscissa": abscissa})
     if isinstance(scale, RotatingFrame):
         a = _complex_coefficients(problem, values.given[2], scale)
@@ -253,10 +253,10 @@ def build_system(
         lead, unit = Fraction(scale.lead), Fraction(scale.unit)
         a = [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
     equalities = [c for c in problem.conditions.values() if c.equality]
-    nonnegative = [x for piece in pieces for x in piece.nonnegative(u)]
+    nonnegative = [x for piece in pieces for x in piece.nonnegative(pattern_unknowns)]
     interchangeable = [(p, q) for p, q in pairwise(pieces) if (p.kind, p.order, p.outer) == (q.kind, q.order, q.outer)]
     limits = {n: c for n, c in problem.conditions.items() if not c.equality and all(name in values for name in c.names)}
-    conditions = divisibility_conditions(a, pieces, u)
+    conditions = divisibility_conditions(a, pieces, pattern_unknowns)
     real_conditions = [part for x in conditions for part in ((x.re, x.im) if isinstance(x, Pair) else (x,))]
     return PatternSystem(
         problem,
@@ -264,9 +264,11 @@ def build_system(
         names,
         lifted,
         equations=formula([*real_conditions, *extra_equations(values, lifted, equalities, at)], names),
-        shared=formula(shared_conditions(a, pieces, u), names),
+        shared=formula(shared_conditions(a, pieces, pattern_unknowns), names),
         nonnegative=formula(nonnegative, names),
-        ascending=formula((q.order_key(u) - p.order_key(u) for p, q in interchangeable), names),
+        ascending=formula(
+            (q.order_key(pattern_unknowns) - p.order_key(pattern_unknowns) for p, q in interchangeable), names
+        ),
         leading=formula([values.coefficients[0]], names),
         limits={n: formula([c(values)], names) for n, c in limits.items()},
     )

@@ -85,12 +85,12 @@ def prune(conditions: BoxConditions, x: Array, min_width: float) -> PrunedBoxes:
     with np.errstate(all="ignore"):
         widths = x[1] - x[0]
         for graph, target in ((conditions.equations, 0.0), (conditions.extra, 0.0), (conditions.limits, np.inf)):
-            x, possible = _contract(graph, x, target)
-            x, widths = x[..., possible], widths[:, possible]
+            x, may_hold_zero = _contract(graph, x, target)
+            x, widths = x[..., may_hold_zero], widths[:, may_hold_zero]
         wide_boxes, image_boxes, has_one_zero, weights = _apply_newton(conditions, x)
         x = _intersect(x, image_boxes)
-        possible = (x[0] <= x[1]).all(axis=0)
-        is_proved, is_open = possible & has_one_zero, possible & ~has_one_zero
+        may_hold_zero = (x[0] <= x[1]).all(axis=0)
+        is_proved, is_open = may_hold_zero & has_one_zero, may_hold_zero & ~has_one_zero
         contract_again = is_open & (x[1] - x[0] < _GAIN * widths).any(axis=0)
         must_split = is_open & ~contract_again
         parts, small = _split_boxes(
@@ -289,12 +289,12 @@ class _Operation:
 
 
 _ONE, _SIGNS = np.ones((2, 1)), np.array([[-1.0], [1.0]])
-_ANYTHING = _SIGNS * np.inf
+_UNBOUNDED = _SIGNS * np.inf
 
 
 def _other_factor(result: Array, factor: Array) -> Array:
     """Divide a product by a factor; the result is unbounded if both may be 0."""
-    return np.where(_has_zero(result) & _has_zero(factor), _ANYTHING, _divide(result, factor))
+    return np.where(_has_zero(result) & _has_zero(factor), _UNBOUNDED, _divide(result, factor))
 
 
 def _undo_absolute(result: Array, a: Array) -> tuple[Array]:
@@ -303,7 +303,7 @@ def _undo_absolute(result: Array, a: Array) -> tuple[Array]:
 
 
 def _unary_operation(
-    name: str, value: Callable[..., Array] | None = None, back: Any = lambda _, a: (_ANYTHING,)
+    name: str, value: Callable[..., Array] | None = None, back: Any = lambda _, a: (_UNBOUNDED,)
 ) -> _Operation:
     """An operation with one operand; its slope, and by default its value, come from ball arithmetic."""
     function = INTERVALS.operations[name]
@@ -396,23 +396,23 @@ def _contract(graph: Formula, x: Array, upper_end: float) -> tuple[Array, Truth]
 
     Evaluates the steps forward, then bounds each operand from the result and the other operand (Benhamou et al. 1999).
     """
-    step_ranges, narrowed = _evaluate_ranges(graph, x), x.copy()
-    possible = np.ones(x.shape[-1], dtype=bool)
+    step_ranges, narrowed_boxes = _evaluate_ranges(graph, x), x.copy()
+    is_possible = np.ones(x.shape[-1], dtype=bool)
 
     def narrow_step(k: int, allowed_range: Array) -> None:
         step_ranges[k] = _intersect(step_ranges[k], allowed_range)
-        np.logical_and(possible, step_ranges[k][0] <= step_ranges[k][1], out=possible)
+        np.logical_and(is_possible, step_ranges[k][0] <= step_ranges[k][1], out=is_possible)
 
     for o in graph.outputs:
         narrow_step(o, np.array([[0.0], [upper_end]]))
     for k, (op, operands, value) in reversed([*enumerate(graph.steps)]):
         if op == INPUT:
-            narrowed[:, graph.names.index(value)] = step_ranges[k]
+            narrowed_boxes[:, graph.names.index(value)] = step_ranges[k]
         elif op != CONSTANT:
             operand_ranges = _OPERATIONS[op].back(step_ranges[k], *(step_ranges[o] for o in operands))
             for o, operand_range in zip(operands, operand_ranges, strict=True):
                 narrow_step(o, operand_range)
-    return narrowed, possible
+    return narrowed_boxes, is_possible
 
 
 def outer_doubles(number: Any) -> tuple[float, float]:

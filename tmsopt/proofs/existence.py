@@ -24,7 +24,7 @@ EXACT = "exact factorisation"
 
 _EXTRA_DIGITS = 25  # decimal digits of the arithmetic beyond the requested ones
 _ATTEMPTS = 3  # each attempt computes with twice the digits of the previous one
-_AT_BOUND = 1e-9  # relative to its range: a parameter closer to an end counts as at that end
+_END_DISTANCE = 1e-9  # relative to its range: a parameter closer to an end counts as at that end
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,9 @@ def _parameter_choices(
     """Yield choices of parameters to move: first only those inside their ranges, to keep the design in the box."""
     ends = {n: problem.free[n] for n in free_names}
     inner_names = [
-        n for n, (lo, hi) in ends.items() if min(stored_values[n] - lo, hi - stored_values[n]) > _AT_BOUND * (hi - lo)
+        n
+        for n, (lo, hi) in ends.items()
+        if min(stored_values[n] - lo, hi - stored_values[n]) > _END_DISTANCE * (hi - lo)
     ]
     if len(inner_names) >= count:
         yield inner_names
@@ -234,14 +236,14 @@ def _check_solution(system: Equations, coefficients: Sequence[Any], at: Mapping[
 
 
 def _other_kind(pattern: Pattern) -> str:
-    kinds = {
+    known_reasons = {
         "2EP2": "the double pair is complex: a CEP2, not a 2EP2",
         "CEP2": "two real double roots: a 2EP2, not a CEP2",
     }
     reason = "the factors have no imaginary roots"
     if _needs_discriminant(pattern):
         reason = "multiple roots are complex instead of real, or real instead of complex"
-    return kinds.get(pattern.name, f"{reason}: no {pattern.name}")
+    return known_reasons.get(pattern.name, f"{reason}: no {pattern.name}")
 
 
 def _undecided_kind(pattern: Pattern) -> str:

@@ -278,16 +278,16 @@ def _exact_patterns(problem: Posed, design: ExactDesign) -> list[Pattern]:
 
 def _simple_doubts(problem: Posed, structure: str, proved_design: ProvedDesign) -> list[str]:
     """Say why the structure of a design without multiple roots is not proved; empty if it is proved."""
-    name = user_structure_name(problem.model, structure)
+    pattern_name = user_structure_name(problem.model, structure)
     if structure not in _SIMPLE_CLAIMS:
-        return [f"double precision cannot decide the structure {name}; locate the pattern you expect"]
+        return [f"double precision cannot decide the structure {pattern_name}; locate the pattern you expect"]
     roots = proved_design.factorisation.roots
     if roots is None:
         return ["some roots are equal or too close to isolate; locate the pattern you expect"]
     other_roots = roots[1:] if roots[0].real else roots[2:]
     if roots[0].real == (structure == "real") and all(z.re < roots[0].re for z in other_roots):
         return []
-    return [f"the rightmost root of the design as stored is not certainly {name}"]
+    return [f"the rightmost root of the design as stored is not certainly {pattern_name}"]
 
 
 def _assemble(

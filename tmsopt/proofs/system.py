@@ -21,7 +21,7 @@ ROUNDINGS = 64
 """A stored design may miss an equation by this many roundings of each number."""
 
 _MIN_PIVOT = 1e-9  # relative: a parameter with a smaller pivot depends on the others
-_ZERO = 1e-30  # relative to a range: remainder that a solver leaves instead of 0
+_ZERO_REMAINDER = 1e-30  # relative to a range: remainder that a solver leaves instead of 0
 _MIN_SCALE = 1e-3  # relative to a range: least scale of a parameter
 _EPS = float(np.finfo(float).eps)
 
@@ -158,7 +158,7 @@ def choose_moved(system: Equations, at: Mapping[str, Any], candidates: Sequence[
         * scale[solved_columns]
         * (ROUNDINGS * _EPS)
     )
-    floors = {n: _ZERO * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
+    floors = {n: _ZERO_REMAINDER * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
     solved = zip((*moved_names, *system.unknowns), rounding_effects, strict=True)
     return MovedParameters(
         moved_names, {n: float(e) + 2 * _EPS * abs(float(at[n])) + floors.get(n, 0.0) for n, e in solved}
