@@ -5,17 +5,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
-import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from mpmath import acos, atan, cos, mpf, nstr, pi, sqrt, workdps
 
-import tmsopt
+from tmsopt import Problem, load, solve_all
 from tmsopt.global_search import prove_completeness
 from tmsopt.models import from_coefficients
+from tmsopt.roots import pattern as pattern_of_name
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
-DIGITS = mpmath.mpf(10) ** -22  # of 25 that are given
+DIGITS = mpf(10) ** -22  # of 25 that are given
 
 x, y, z = (ca.SX.sym(n) for n in "xyz")
 
@@ -23,33 +24,34 @@ pytestmark = pytest.mark.slow
 
 
 def of_file(name, **changes):
-    return prove_completeness(replace(tmsopt.load(PROBLEMS / f"{name}.toml"), **changes).posed)
+    return prove_completeness(replace(load(PROBLEMS / f"{name}.toml"), **changes).posed)
 
 
-def of_row(row, pattern, box=(-4.0, 4.0), **asked):
+def of_row(row, pattern, box=(-4.0, 4.0), constraints=None, **options):
     """The designs of a polynomial in x, y, z with a pattern."""
     model = from_coefficients(row)
-    names = [n for n in "xyz" if n in model.sets[0].names]
-    return prove_completeness(
-        tmsopt.Problem(model=model, free=dict.fromkeys(names, box), locate=pattern, **asked).posed
-    )
+    free = dict.fromkeys(sorted(model.sets[0].names), box)
+    return prove_completeness(Problem(model, free=free, locate=pattern, constraints=constraints or {}).posed, **options)
 
 
-def agree(found, designs):
-    """Whether these are the designs, to the last digits."""
-    own = [[mpmath.mpf(n.value) for n in design.values()] for design in found.designs]
-    assert all(len(limits) == 0 for limits in found.limits)
-    order = [sorted(rows, key=lambda row: [float(v) for v in row]) for rows in (own, designs)]
-    return len(own) == len(designs) and all(
-        abs(a - b) < DIGITS * (1 + abs(b))
-        for one, other in zip(*order, strict=True)
-        for a, b in zip(one, other, strict=True)
-    )
+def check_all(result, designs):
+    """Check that these are proved to be all designs, to the last digits."""
+    assert result.complete
+    assert not any(result.limits)
+    proved = [[mpf(n.value) for n in design.values()] for design in result.designs]
+    order = [sorted(rows, key=lambda row: [*map(float, row)]) for rows in (proved, designs)]
+    for row, expected in zip(*order, strict=True):
+        assert all(abs(a - b) < DIGITS * (1 + abs(b)) for a, b in zip(row, expected, strict=True))
+
+
+def places(result, name="x"):
+    """A parameter of each design."""
+    return [float(design[name]) for design in result.designs]
 
 
 @pytest.fixture(autouse=True)
 def digits():
-    with mpmath.workdps(40):
+    with workdps(40):
         yield
 
 
@@ -58,22 +60,18 @@ def digits():
 
 def test_the_ep4_of_the_paper():
     """tan λ_s = 15/4 − 75 √2/32, χ_B = √2, Fr = 3 √(110 √2 − 120)/8 (Kirillov 2018)."""
-    root = mpmath.sqrt(2)
-    tilt = mpmath.atan(mpmath.mpf(15) / 4 - 75 * root / 32)
-    found = of_file("ep4_matching")
-    assert found.complete
-    assert agree(found, [[root, 3 * mpmath.sqrt(110 * root - 120) / 8, tilt]])
+    root = sqrt(2)
+    tilt = atan(mpf(15) / 4 - 75 * root / 32)
+    check_all(of_file("ep4_matching"), [[root, 3 * sqrt(110 * root - 120) / 8, tilt]])
 
 
 def test_the_four_cep2_of_a_coupled_pair():
     """c2 = 11/10 with k = 1/8 ∓ √106/20, c2 = −11/10 with k = 9/50 ∓ 3 √435/100."""
-    one, other = mpmath.sqrt(106) / 20, 3 * mpmath.sqrt(435) / 100
-    tenths = mpmath.mpf(11) / 10
-    designs = [[tenths, mpmath.mpf(1) / 8 + s * one] for s in (-1, 1)]
-    designs += [[-tenths, mpmath.mpf(9) / 50 + s * other] for s in (-1, 1)]
-    found = of_file("coupled_pair")
-    assert found.complete
-    assert agree(found, designs)
+    one, other = sqrt(106) / 20, 3 * sqrt(435) / 100
+    tenths = mpf(11) / 10
+    designs = [[tenths, mpf(1) / 8 + s * one] for s in (-1, 1)]
+    designs += [[-tenths, mpf(9) / 50 + s * other] for s in (-1, 1)]
+    check_all(of_file("coupled_pair"), designs)
 
 
 def test_the_optimised_benchmark_is_the_only_bicycle():
@@ -89,26 +87,18 @@ def test_the_optimised_benchmark_is_the_only_bicycle():
 
 def test_the_three_controllers_with_one_root():
     """(s⁴ + 2 s²)(s² + x1 s + x0) + y2 s² + y1 s + y0 = (s − r)⁶: x1 = −6r, 15 r² = x0 + 2, 20 r³ = 12 r."""
-    r = mpmath.sqrt(mpmath.mpf(3) / 5)
-    designs = [
-        [15 * s**2 - 2, -6 * s, s**6, -6 * s**5, 15 * s**4 - 2 * (15 * s**2 - 2)] for s in (-r, mpmath.mpf(0), r)
-    ]
-    found = of_file("two_mass_spring", minimize=None, locate="EP6")
-    assert found.complete
-    assert agree(found, designs)
+    r = sqrt(mpf(3) / 5)
+    designs = [[15 * s**2 - 2, -6 * s, s**6, -6 * s**5, 15 * s**4 - 2 * (15 * s**2 - 2)] for s in (-r, mpf(0), r)]
+    check_all(of_file("two_mass_spring", minimize=None, locate="EP6"), designs)
 
 
 def test_ten_meetings_of_one_pair():
     """s² + 3 T₅(x) s + 1 has a double root where T₅(x) = ±2/3."""
     chebyshev = 16 * x**5 - 20 * x**3 + 5 * x
-    angles = [mpmath.acos(s * mpmath.mpf(2) / 3) for s in (-1, 1)]
-    designs = {
-        mpmath.nstr(mpmath.cos((s * a + 2 * mpmath.pi * k) / 5), 30) for a in angles for s in (-1, 1) for k in range(5)
-    }
+    angles = [acos(s * mpf(2) / 3) for s in (-1, 1)]
+    designs = {nstr(cos((s * a + 2 * pi * k) / 5), 30) for a in angles for s in (-1, 1) for k in range(5)}
     assert len(designs) == 10
-    found = of_row([1, 3 * chebyshev, 1], "EP2", (-1.5, 1.5))
-    assert found.complete
-    assert agree(found, [[mpmath.mpf(d)] for d in designs])
+    check_all(of_row([1, 3 * chebyshev, 1], "EP2", (-1.5, 1.5)), [[mpf(d)] for d in designs])
 
 
 @pytest.mark.parametrize("size", [1e-3, 0.4, 50.0])
@@ -173,7 +163,7 @@ def test_a_design_of_each_pattern_is_among_them(pattern, factors):
     row = [1.0]
     for factor in factors:
         row = np.polymul(row, factor).tolist()
-    count = tmsopt.roots.pattern(pattern, len(row) - 1).codimension
+    count = pattern_of_name(pattern, len(row) - 1).codimension
     rng = np.random.default_rng(len(row))
     weights = rng.integers(-3, 4, (len(row), 3)).tolist()
     names = [x, y, z][:count]
@@ -197,9 +187,7 @@ def test_inequalities_take_part():
         ("sqrt(x + 3) >= 2", [[2]]),
         ("abs(x) >= 1", [[-2], [2]]),
     ):
-        found = of_row([1, x, 1], "EP2", constraints={"limit": text})
-        assert found.complete, text
-        assert agree(found, designs), text
+        check_all(of_row([1, x, 1], "EP2", constraints={"limit": text}), designs)
 
 
 @pytest.mark.parametrize(
@@ -208,21 +196,19 @@ def test_inequalities_take_part():
 def test_a_design_on_a_limit_is_said_to_be(asked, limit):
     found = of_row([1, x, 1], "EP2", **asked)
     assert found.complete
-    assert [float(d["x"]) for d in found.designs] == [-2.0, 2.0]
+    assert places(found) == [-2.0, 2.0]
     assert found.limits == (limit, "")
 
 
 def test_what_is_beyond_a_limit_by_a_hair_is_beyond():
-    assert [float(d["x"]) for d in of_row([1, x, 1], "EP2", (-1.9999999999999, 5.0)).designs] == [2.0]
+    assert places(of_row([1, x, 1], "EP2", (-1.9999999999999, 5.0))) == [2.0]
 
 
 def test_signs_tell_patterns_apart():
     """(s² + x s + 1)²: two real double roots for x² > 4, a complex pair for x² < 4."""
     row = [1, 2 * x, x * x + 2, 2 * x + (x * x - 9) * (x * x - 1) + y - 1, 1 + y * (y - 1)]
     for pattern, designs in (("2EP2", [[-3, 1], [3, 1]]), ("CEP2", [[-1, 1], [1, 1]])):
-        found = of_row(row, pattern, (-4.0, 4.0), constraints={"one": "y >= 1/2"})
-        assert found.complete, (pattern, found)
-        assert agree(found, designs), pattern
+        check_all(of_row(row, pattern, constraints={"one": "y >= 1/2"}), designs)
 
 
 # What is not decided
@@ -232,7 +218,7 @@ def test_where_two_designs_meet_stays_undecided():
     """(s + 1)² + x²(x − 1): a double root at x = 0, where two designs meet, and at x = 1."""
     found = of_row([1, 2, 1 + x * x * (x - 1)], "EP2")
     assert not found.complete
-    assert [float(d["x"]) for d in found.designs] == [1.0]
+    assert places(found) == [1.0]
     assert "singular" in found.reason
     for place in found.undecided:
         assert max(map(abs, place.ranges["x"])) < 1e-3  # x² of boxes 1e-7 as wide as the first
@@ -243,9 +229,7 @@ def test_a_curve_of_designs_stays_undecided_and_no_more():
     """s⁴ + (Om² − 1 − k) s² + k: both pairs meet wherever Om = 1 + √k, from 1.71 to 2.73 in this box."""
     Om, k = ca.SX.sym("Om"), ca.SX.sym("k")
     model = from_coefficients([1, 0, Om**2 - 1 - k, 0, k])
-    found = prove_completeness(
-        tmsopt.Problem(model=model, free={"Om": (0.5, 6.0), "k": (0.5, 3.0)}, locate="CEP2").posed
-    )
+    found = prove_completeness(Problem(model=model, free={"Om": (0.5, 6.0), "k": (0.5, 3.0)}, locate="CEP2").posed)
     assert not found.complete
     assert "singular" in found.reason
     lower, upper = (f(place.ranges["Om"][j] for place in found.undecided) for j, f in ((0, min), (1, max)))
@@ -254,8 +238,7 @@ def test_a_curve_of_designs_stays_undecided_and_no_more():
 
 
 def test_time_that_is_over():
-    model = from_coefficients([1, x, 1])
-    found = prove_completeness(tmsopt.Problem(model=model, free={"x": (-4, 4)}, locate="EP2").posed, seconds=1e-6)
+    found = of_row([1, x, 1], "EP2", seconds=1e-6)
     assert not found.complete
     assert found.designs == ()
     assert found.reason == "time limit reached"
@@ -275,7 +258,7 @@ def test_a_limit_is_asked_of_every_design(text, most, ends):
     """Also where branch and prune cannot take it, as the lesser of two: log 7 = 1.946."""
     found = of_row([1, x, 1 + 0 * x], "EP2", constraints={"most": text.format(most)})
     assert found.complete
-    assert sorted(float(d["x"].value) for d in found.designs) == pytest.approx(ends, abs=1e-12)
+    assert places(found) == pytest.approx(ends, abs=1e-12)
 
 
 # What is told
@@ -283,11 +266,9 @@ def test_a_limit_is_asked_of_every_design(text, most, ends):
 
 def test_progress_is_told_in_seconds():
     told = []
-    prove_completeness(
-        tmsopt.load(PROBLEMS / "coupled_pair.toml").posed, 30, lambda done, most, _: told.append((done, most))
-    )
+    prove_completeness(load(PROBLEMS / "coupled_pair.toml").posed, 30, lambda *counts: told.append(counts))
     assert told
-    assert all(0 <= done <= most == 30 for done, most in told)
+    assert all(0 <= done <= most == 30 for done, most, _ in told)
 
 
 def test_limits_on_derived_quantities_take_part():
@@ -307,7 +288,7 @@ def test_ctrl_c_is_no_end():
     def stop(*_):
         raise KeyboardInterrupt
 
-    found = prove_completeness(tmsopt.load(PROBLEMS / "coupled_pair.toml").posed, progress=stop)
+    found = prove_completeness(load(PROBLEMS / "coupled_pair.toml").posed, progress=stop)
     assert not found.complete
     assert found.stopped
     assert found.reason == "interrupted"
@@ -317,7 +298,7 @@ def test_ctrl_c_is_no_end():
         if told.unit == "s" and told.most > 0:
             stop()
 
-    every = tmsopt.solve_all(PROBLEMS / "coupled_pair.toml", progress=later)
+    every = solve_all(PROBLEMS / "coupled_pair.toml", progress=later)
     assert every.coverage is None
 
 
@@ -326,4 +307,4 @@ def test_a_design_at_which_a_limit_has_no_value_is_none(limit, kept):
     """s² + x s + 1 has its double roots at x = 2 and x = -2."""
     found = of_row([1, x, 1], "EP2", (-3.0, 3.0), constraints={"a": limit})
     assert found.complete
-    assert [float(design["x"].value) for design in found.designs] == pytest.approx([kept], abs=1e-9)
+    assert places(found) == pytest.approx([kept], abs=1e-9)

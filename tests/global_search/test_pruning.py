@@ -52,7 +52,7 @@ def pruned(equations, box, least=1e-7, turns=60, limits=nothing):
     for _ in range(turns):
         found = prune(conditions, waiting[..., -512:], least)
         kept += [found.proved[1], found.small]
-        waiting = np.concatenate([waiting[..., :-512], found.remaining_factors], axis=-1)
+        waiting = np.concatenate([waiting[..., :-512], found.remaining], axis=-1)
     return np.concatenate([*kept, waiting], axis=-1)
 
 

@@ -21,7 +21,12 @@ DAMPED = (1, X - 2, 1)
 
 
 def problem(coefficients, free, **asked):
-    return Problem(from_coefficients(list(coefficients)), free=free, **{"minimize": "abscissa", **asked})
+    return Problem(from_coefficients(list(coefficients)), free=free, **{"minimize": "abscissa", **asked}).posed
+
+
+def find_damped(most, known=None, **asked):
+    """A stable design of s² + (x − 2) s + 1 with x up to `most`."""
+    return find_stable_design(problem(DAMPED, {"x": (0, most)}, **asked), SECONDS, known_design=known)
 
 
 @scip
@@ -41,32 +46,23 @@ def problem(coefficients, free, **asked):
 @pytest.mark.slow
 def test_boxes_without_a_stable_design(coefficients, free, asked):
     stated = problem(coefficients, free, **asked)
-    assert find_stable_design(stated.posed, SECONDS).any is False
-    assert (
-        find_stable_design(
-            stated.posed, SECONDS, known=stated.posed.ordered({n: hi for n, (_, hi) in free.items()})
-        ).any
-        is False
-    )
+    for known in (None, stated.ordered({n: hi for n, (_, hi) in free.items()})):
+        assert find_stable_design(stated, SECONDS, known_design=known).any is False
 
 
 @scip
 @pytest.mark.parametrize("most", [3.0, 2.001])
 def test_a_stable_design_is_found(most):
     """Be it one in a thousand."""
-    found = find_stable_design(problem(DAMPED, {"x": (0, most)}).posed, SECONDS)
+    found = find_damped(most)
     assert found.any is True
-    assert found.design is not None
     assert 2 < found.design["x"] <= most
 
 
 @scip
 def test_limits_hold_for_what_is_found():
-    found = find_stable_design(
-        problem(DAMPED, {"x": (0, 9)}, constraints={"most": "x**2 <= 5", "rest": "abscissa >= 1"}).posed, SECONDS
-    )
+    found = find_damped(9, constraints={"most": "x**2 <= 5", "rest": "abscissa >= 1"})
     assert found.any is True
-    assert found.design is not None
     assert 4 < found.design["x"] ** 2 <= 5 * (1 + 1e-9)  # the recheck's own tolerance
 
 
@@ -82,7 +78,7 @@ def test_limits_hold_for_what_is_found():
 def test_of_designs_on_the_axis_nothing_is_said(coefficients, most):
     """What is refuted is that roots may lie left of the axis or on it, and here they may."""
     began = time.perf_counter()
-    assert find_stable_design(problem(coefficients, {"x": (0, most)}).posed, 60.0).any is None
+    assert find_stable_design(problem(coefficients, {"x": (0, most)}), 60.0).any is None
     assert time.perf_counter() - began < 10  # and no time is spent on it
 
 
@@ -91,7 +87,7 @@ def test_a_solver_that_says_no_to_everything_is_not_believed(monkeypatch):
     monkeypatch.setattr(
         SolverPool, "race", lambda self, tasks, tick=None: [Decision(INFEASIBLE, bound=1.0) for _ in tasks]
     )
-    assert find_stable_design(problem(DAMPED, {"x": (0, 3)}).posed, SECONDS, known={"x": 1.0}) == Stability()
+    assert find_damped(3, {"x": 1.0}) == Stability()
 
 
 @scip
@@ -107,15 +103,12 @@ def test_an_interrupt_goes_on(when, monkeypatch):
     monkeypatch.setattr(asking, "has_no_stable_design", lambda problem: False)
     monkeypatch.setattr(SolverPool, "race", stop)
     with pytest.raises(KeyboardInterrupt):
-        find_stable_design(problem(DAMPED, {"x": (0, 1)}).posed, SECONDS, known={"x": 1.0})
+        find_damped(1, {"x": 1.0})
 
 
 @scip
 def test_what_scip_cannot_take_is_left_undecided():
-    assert (
-        find_stable_design(problem(DAMPED, {"x": (0, 3)}, constraints={"huge": "exp(60*x) >= 1e10"}).posed, SECONDS)
-        == Stability()
-    )
+    assert find_damped(3, constraints={"huge": "exp(60*x) >= 1e10"}) == Stability()
 
 
 def test_without_a_global_solver_nothing_is_asked(monkeypatch):

@@ -30,6 +30,15 @@ def nlp_of(variables, function, *limits):
     return NLP("test", variables, from_casadi(function, names), {}, *limits)
 
 
+def value_of(text, **at):
+    """The value of an expression."""
+    return parse_value(text, tuple(at))(at)
+
+
+def decide(nlp, seconds=5.0, **options):
+    return SCIP.decide(make_task(nlp, seconds, **options))
+
+
 scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
 
 # Interlacing. The polynomials are products of rational factors, so where their roots are is known without computing
@@ -214,9 +223,6 @@ def test_roots_have_no_bound_where_one_may_be_at_infinity():
         assert bound_roots([leading, (1.0, 1.0), (1.0, 1.0)]) == math.inf
 
 
-# One instruction after the other
-
-
 # What SCIP is told
 
 ONE_OF_EACH = {
@@ -258,7 +264,7 @@ ONE_OF_EACH = {
 def least(text, ends, sign=1.0):
     """minimise ± an expression of one x."""
     x = ca.SX.sym("x")
-    f = ca.Function("f", [x], [sign * ca.SX(parse_value(text, ("x",))({"x": x})), ca.SX(0, 1)])
+    f = ca.Function("f", [x], [sign * ca.SX(value_of(text, x=x)), ca.SX(0, 1)])
     return nlp_of(("x",), f, (float(ends[0]),), (float(ends[1]),), (), (), ())
 
 
@@ -267,9 +273,9 @@ def least(text, ends, sign=1.0):
 def test_every_operation_is_what_it_is(text):
     """With x known, no value is possible but that of NumPy; within the 1e-6 of the size that a bound is moved by."""
     at, _ = ONE_OF_EACH[text]
-    value = float(parse_value(text, ("x",))({"x": at}))
+    value = float(value_of(text, x=at))
     for sign in (1.0, -1.0):
-        decision = SCIP.decide(make_task(least(text, (at, at), sign), 5.0, minimise=True))
+        decision = decide(least(text, (at, at), sign), minimise=True)
         assert decision.verdict == FOUND
         assert decision.bound == pytest.approx(sign * value, abs=3e-6 * (1 + abs(value)))
         assert decision.bound <= sign * value
@@ -281,10 +287,10 @@ def test_every_operation_is_what_it_is(text):
 def test_no_value_is_below_the_bound(text):
     """Values at 30 001 points, 0 and 1 among them, their least within 1e-6 of the true one; a bound is moved by as much."""
     _, ends = ONE_OF_EACH[text]
-    values = parse_value(text, ("x",))({"x": np.linspace(*ends, 30001)})
+    values = value_of(text, x=np.linspace(*ends, 30001))
     for sign in (1.0, -1.0):
         lowest = float((sign * values).min())
-        decision = SCIP.decide(make_task(least(text, ends, sign), 5.0, minimise=True))
+        decision = decide(least(text, ends, sign), minimise=True)
         assert decision.verdict == FOUND
         assert lowest - 1e-5 * (1 + abs(lowest)) <= decision.bound <= lowest
 
@@ -292,7 +298,7 @@ def test_no_value_is_below_the_bound(text):
 def constrained(texts, ends, most=0.0):
     """Whether there are x, y with every expression ≤ most."""
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    rows = [ca.SX(parse_value(text, ("x", "y"))({"x": x, "y": y})) for text in texts]
+    rows = [ca.SX(value_of(text, x=x, y=y)) for text in texts]
     f = ca.Function("f", [ca.vertcat(x, y)], [ca.SX(0), ca.vertcat(*rows)])
     lower, upper = zip(*ends, strict=True)
     count = len(texts)
@@ -315,11 +321,11 @@ def constrained(texts, ends, most=0.0):
     ],
 )
 def test_possible_and_impossible(texts, possible):
-    decision = SCIP.decide(make_task(constrained(texts, [(-2, 2), (0.5, 2)]), 5.0))
+    decision = decide(constrained(texts, [(-2, 2), (0.5, 2)]))
     assert decision.verdict == (FOUND if possible else INFEASIBLE)
     if possible:
-        x, y = decision.point if decision.point is not None else (math.nan, math.nan)
-        values = [float(parse_value(t, ("x", "y"))({"x": x, "y": y})) for t in texts]
+        x, y = decision.point
+        values = [float(value_of(t, x=x, y=y)) for t in texts]
         assert max(values) <= 1e-6
     else:
         assert decision.bound == math.inf
@@ -331,12 +337,10 @@ def test_possible_and_impossible(texts, possible):
 def test_hardly_any_room_is_room(text, width):
     """Summands cancel in a narrow box, and what is left of them is not known to more digits than they are."""
     centre = {"x": 1.7, "y": 0.9}
-    value = float(parse_value(text, ("x", "y"))(centre))
+    value = float(value_of(text, **centre))
     ends = [(v - width, v + width) for v in centre.values()]
-    assert (
-        SCIP.decide(make_task(constrained([f"{text} - ({value!r})", f"{value!r} - ({text})"], ends), 5.0)).verdict
-        == FOUND
-    )
+    rows = [f"{text} - ({value!r})", f"{value!r} - ({text})"]
+    assert decide(constrained(rows, ends)).verdict == FOUND
 
 
 def drawn_expression(rng, depth):
@@ -360,15 +364,12 @@ def test_what_is_possible_is_never_called_impossible(seed):
     text = drawn_expression(rng, 4)
     box = np.array([[-1.0, 1.5], [0.25, 2.0]])
     points = np.vstack([box.T, box.mean(axis=1)[None], [[0.0, 1.0]], rng.uniform(*box.T, (30, 2))])
-    values = np.broadcast_to(parse_value(text, ("x", "y"))({"x": points[:, 0], "y": points[:, 1]}), len(points))
+    values = np.broadcast_to(value_of(text, x=points[:, 0], y=points[:, 1]), len(points))
     known = values[np.isfinite(values) & (np.abs(values) < 1e3)]
     for value in (known.min(), known.max(), known[0]) if len(known) else ():
         slack = 1e-8 * (1 + abs(value))
         rows = [f"{text} - ({float(value + slack)!r})", f"({float(value - slack)!r}) - ({text})"]
-        assert SCIP.decide(make_task(constrained(rows, [(-1.0, 1.5), (0.25, 2.0)]), 0.5)).verdict != INFEASIBLE, (
-            text,
-            value,
-        )
+        assert decide(constrained(rows, box.tolist()), 0.5).verdict != INFEASIBLE, (text, value)
 
 
 @scip
@@ -377,7 +378,7 @@ def test_a_row_without_variables():
         x = ca.SX.sym("x", 2)
         f = ca.Function("f", [x], [ca.SX(0), ca.vertcat(ca.SX(value))])
         nlp = nlp_of(("x", "y"), f, (0.0, 0.0), (1.0, 1.0), ("row",), (-math.inf,), (0.0,))
-        assert SCIP.decide(make_task(nlp, 5.0)).verdict == verdict
+        assert decide(nlp).verdict == verdict
 
 
 @scip
@@ -385,4 +386,4 @@ def test_an_operation_that_scip_lacks_is_named():
     x = ca.SX.sym("x")
     f = ca.Function("f", [x], [ca.floor(x), ca.SX(0, 1)])
     with pytest.raises(UnsupportedOperation, match="floor"):
-        SCIP.decide(make_task(nlp_of(("x",), f, (0.0,), (1.0,), (), (), ()), 1.0))
+        decide(nlp_of(("x",), f, (0.0,), (1.0,), (), (), ()))

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-import tmsopt
+from tmsopt import Problem, certify, solve
 from tmsopt.evaluation import recheck
 from tmsopt.global_search import FOUND, SCIP, UNDECIDED, Decision, SolverPool
 from tmsopt.models import from_coefficients
@@ -22,13 +22,12 @@ X = ca.SX.sym("x")
 
 def problem(**asked):
     """s² + x s + 1: for 0 < x < 2 the abscissa is −x/2; 1 at x = 1 for every objective below."""
-    return tmsopt.Problem(from_coefficients([1, X, 1]), free={"x": (0.1, 1.9)}, **asked)
+    return Problem(from_coefficients([1, X, 1]), free={"x": (0.1, 1.9)}, **asked)
 
 
 @pytest.fixture
 def lost(monkeypatch):
     """An IPOPT that converges nowhere, once the first search is over."""
-    solve = tmsopt.solve
 
     def failing(asked, **options):
         return replace(solve(asked, **options), status="not_converged", value=float("nan"))
@@ -38,14 +37,14 @@ def lost(monkeypatch):
 
 def worse(asked, **changed):
     """The best design of a smaller box, 1 ≤ x ≤ 1.2, sold as that of the whole one."""
-    return replace(tmsopt.solve(replace(asked, free={"x": (1.0, 1.2)}), throw=False), problem=asked, **changed)
+    return replace(solve(replace(asked, free={"x": (1.0, 1.2)}), throw=False), problem=asked, **changed)
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("lost")
 def test_a_better_design_is_the_answer_though_nothing_converges_from_it():
     """The least abscissa is −0.95. Found again and again, until none is better by a 1e-4 of it, and that is proved."""
-    design = tmsopt.certify(worse(problem(minimize="abscissa")), seconds=SECONDS)
+    design = certify(worse(problem(minimize="abscissa")), seconds=SECONDS)
     assert design.status == "not_converged"
     assert -0.95 <= design.value <= -0.95 * (1 - 1e-4)
     assert design.bound.proven
@@ -56,7 +55,7 @@ def test_a_better_design_is_the_answer_though_nothing_converges_from_it():
 
 
 def test_where_the_solver_converges_the_optimum_is_the_answer():
-    design = tmsopt.certify(worse(problem(minimize="abscissa")), seconds=SECONDS)
+    design = certify(worse(problem(minimize="abscissa")), seconds=SECONDS)
     assert (design.status, design.bound.proven) == ("optimal", True)
     assert design.value == pytest.approx(-0.95, abs=1e-12)
 
@@ -67,8 +66,8 @@ def test_where_the_solver_converges_the_optimum_is_the_answer():
 def test_a_feasible_design_is_never_called_infeasible(status):
     """x² ≥ 3.6 leaves 1.897 ≤ x ≤ 1.9: a corner that the search is said to have missed."""
     asked = problem(minimize="x", constraints={"corner": "x**2 >= 3.6"})
-    missed = replace(tmsopt.solve(asked), status=status, value=float("nan"))
-    design = tmsopt.certify(missed, seconds=SECONDS)
+    missed = replace(solve(asked), status=status, value=float("nan"))
+    design = certify(missed, seconds=SECONDS)
     assert design.status == "not_converged"
     assert not recheck(asked.posed, design.parameters).violations
     assert design.value == design.parameters["x"]
@@ -76,6 +75,10 @@ def test_a_feasible_design_is_never_called_infeasible(status):
         "branch and bound found a feasible design"
     )
     assert 3.6**0.5 * (1 - 2e-4) <= design.bound.value <= 3.6**0.5 <= design.value * (1 + 1e-9)
+
+
+def check_unchanged(design, found):
+    assert (design.status, design.value, design.notes) == ("optimal", found.value, found.notes)
 
 
 @pytest.mark.slow
@@ -88,9 +91,9 @@ def test_what_is_better_only_beyond_a_limit_is_no_alarm(off, monkeypatch):
         return [Decision(UNDECIDED) if task.box else beyond for task in tasks]
 
     monkeypatch.setattr(SolverPool, "race", race)
-    found = tmsopt.solve(problem(minimize="1 + 1000*(x - 1)", constraints={"least": "x >= 1"}))
-    design = tmsopt.certify(found, seconds=1.0)
-    assert (design.status, design.value, design.notes) == ("optimal", found.value, found.notes)
+    found = solve(problem(minimize="1 + 1000*(x - 1)", constraints={"least": "x >= 1"}))
+    design = certify(found, seconds=1.0)
+    check_unchanged(design, found)
     assert design.parameters == found.parameters
     assert design.value == pytest.approx(1.0, abs=1e-9)
 
@@ -104,7 +107,7 @@ def test_a_design_that_is_off_by_a_rounding_is_none_where_nothing_mends_it(monke
 @pytest.mark.slow
 def test_what_is_better_in_the_cases_asked_alone_is_no_alarm():
     """Between the speeds at which the best design was checked, another that is better at those does worse than it."""
-    found = tmsopt.solve("problems/speed_band.toml")
-    design = tmsopt.certify(found, seconds=5.0)
-    assert (design.status, design.value, design.notes) == ("optimal", found.value, found.notes)
+    found = solve("problems/speed_band.toml")
+    design = certify(found, seconds=5.0)
+    check_unchanged(design, found)
     assert design.bound.proven

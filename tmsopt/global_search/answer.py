@@ -18,17 +18,17 @@ from tmsopt.program.formulate import design_of, variables_of
 from tmsopt.program.starts import initial_point
 from tmsopt.progress import Counts
 
-_ROW_TOLERANCE = 1e-6  # relative to a row's range; SCIP keeps 1e-9, multiple roots have half the digits
-_NEARBY = 1e-4  # of a variable's range: half the width of the box around a known design
-_MIN_RANGE = 1e-2  # relative: shorter ranges count as this long, since SCIP cannot resolve less
-_SHORT_SECONDS = 1.0  # for a bound on a0, and for the box around a known design
-_FIRST_SECONDS = 2.0  # for the first turn; each turn doubles it
+_ROW_TOLERANCE = 1e-6  # relative to a row's range: SCIP meets a row to 1e-9, but multiple roots have half the digits
+_HALF_WIDTH = 1e-4  # half the width of the box around a known design, relative to the range of each variable
+_MIN_RANGE = 1e-2  # relative to 1 + |x|: shorter ranges count as this long, since SCIP cannot resolve less
+_SHORT_SECONDS = 1.0  # time limit for a bound on a0, and for the box around a known design
+_FIRST_SECONDS = 2.0  # time limit of the first turn; each turn doubles it
 _TURNS = (((1.0, False), (1.0, True)), ((4.0, False), (0.25, False)), ((16.0, False), (4.0, True)))
 """Formulations that race in each turn: (factor on the unit of the roots, compact)."""
 
 
 class Clock:
-    """Time and nodes that a proof has used.
+    """Counts the time and the search nodes that a proof has used.
 
     Attributes:
         note: the state of the proof, shown as progress.
@@ -72,13 +72,13 @@ class Answer:
 
     Attributes:
         verdict: ``infeasible`` (no such design), ``found`` or ``undecided``.
-        better: the optimum reached from the design found.
-        other: the design found, if it is feasible and better but no optimum was reached from it.
+        better: the optimum reached from the point that the solver found.
+        point: that point, if it is feasible and better but no optimum was reached from it.
     """
 
     verdict: str
     better: Solution | None = None
-    other: Mapping[str, float] | None = None
+    point: Mapping[str, float] | None = None
 
 
 PointCheck = Callable[[Mapping[str, float]], Answer]
@@ -92,10 +92,11 @@ def answer_question(question: Question, clock: Clock, share: float, confirm: Poi
     lasts longer than the one before.
 
     Args:
-        confirm: judges a point found; ``undecided`` if the point exists only within the solver's tolerance.
+        confirm: judges a point that the solver found; ``undecided`` if the point is feasible only within the solver's
+            tolerance.
 
     Raises:
-        NotAccepted: for an operation that the solver does not support.
+        UnsupportedOperation: for an operation that the solver does not support.
     """
     end = clock.seconds_used + share * clock.seconds_left
     for sign in question.possible_signs():
@@ -107,19 +108,23 @@ def answer_question(question: Question, clock: Clock, share: float, confirm: Poi
 
 def _answer_for_sign(question: Question, sign: int, clock: Clock, end: float, confirm: PointCheck) -> Answer:
     """Answer a question for one sign of a0."""
-    least = 0.0
+    least_lead = 0.0
     if (leading := question.leading_program(sign)) is not None:
-        least = clock.race([make_task(leading, min(_SHORT_SECONDS, end - clock.seconds_used), minimise=True)])[0].bound
-        if least == math.inf:  # the constraints alone are infeasible
+        least_lead = clock.race([make_task(leading, min(_SHORT_SECONDS, end - clock.seconds_used), minimise=True)])[
+            0
+        ].bound
+        if least_lead == math.inf:  # the constraints alone are infeasible
             return Answer(INFEASIBLE)
     for turn in count():
-        left = min(end - clock.seconds_used, clock.seconds_left)
-        if left <= 0:
+        seconds_left = min(end - clock.seconds_used, clock.seconds_left)
+        if seconds_left <= 0:
             return Answer(UNDECIDED)
-        seconds = min(left, _FIRST_SECONDS * 2.0 ** min(turn, 30))  # a solver that gives up at once takes many turns
+        seconds = min(
+            seconds_left, _FIRST_SECONDS * 2.0 ** min(turn, 30)
+        )  # a solver that gives up at once takes many turns
         variants = [replace(question, unit=question.unit * u, compact=c) for u, c in _TURNS[turn % len(_TURNS)]]
         try:
-            decisions = clock.race([make_task(v.program(sign, max(least, 0.0)), seconds) for v in variants])
+            decisions = clock.race([make_task(v.program(sign, max(least_lead, 0.0)), seconds) for v in variants])
         except UnsupportedOperation:
             if turn == 0:
                 raise
@@ -128,14 +133,14 @@ def _answer_for_sign(question: Question, sign: int, clock: Clock, end: float, co
             return Answer(INFEASIBLE)
         for decision in decisions:
             if decision.point is not None:
-                found = confirm(design_of(question.problem, decision.point.tolist()))
-                if found.verdict == FOUND:
-                    return found
+                reply = confirm(design_of(question.problem, decision.point.tolist()))
+                if reply.verdict == FOUND:
+                    return reply
     raise AssertionError  # unreachable: time ends
 
 
 def find_exclusion(question: Question, design: Mapping[str, float]) -> str:
-    """Why a question excludes a design that it must admit; empty if it admits the design.
+    """Say why a question excludes a design that it must admit; empty if it admits the design.
 
     A question with a wrong limit, range or equation excludes the known design, and then its answer proves nothing.
     """
@@ -144,14 +149,17 @@ def find_exclusion(question: Question, design: Mapping[str, float]) -> str:
         nlp = question.program(sign)
         x = initial_point(nlp, question.problem, design)
         rows = nlp.evaluate(x)[1]
-        _, *reached = ranges(nlp.numeric_formula, list(zip(nlp.lower, nlp.upper, strict=True)))
-        sizes = np.array([max(map(abs, ends)) for ends in reached])
+        _, *row_ranges = ranges(nlp.numeric_formula, list(zip(nlp.lower, nlp.upper, strict=True)))
+        sizes = np.array([max(map(abs, ends)) for ends in row_ranges])
         sizes = np.where(np.isfinite(sizes), np.maximum(sizes, 1e-300), 1.0)
-        off = np.maximum(np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper)) / sizes
+        row_excesses = np.maximum(np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper)) / sizes
         span = np.maximum(1.0, np.abs(x))
-        outside = np.maximum(np.array(nlp.lower) - x, x - np.array(nlp.upper)) / span
-        named = [*zip(off.tolist(), nlp.rows, strict=True), *zip(outside.tolist(), nlp.variables, strict=True)]
-        excesses.append(max(((np.inf if np.isnan(e) else e), name) for e, name in named))
+        variable_excesses = np.maximum(np.array(nlp.lower) - x, x - np.array(nlp.upper)) / span
+        named_excesses = [
+            *zip(row_excesses.tolist(), nlp.rows, strict=True),
+            *zip(variable_excesses.tolist(), nlp.variables, strict=True),
+        ]
+        excesses.append(max(((np.inf if np.isnan(e) else e), name) for e, name in named_excesses))
     if not excesses:
         return "the question excludes every design, the known one too"
     excess, name = min(excesses)
@@ -159,7 +167,7 @@ def find_exclusion(question: Question, design: Mapping[str, float]) -> str:
 
 
 def is_excluded_by_solver(question: Question, design: Mapping[str, float], clock: Clock) -> bool:
-    """Whether the solver calls a small box around a feasible design infeasible; then its answers prove nothing.
+    """Whether the solver calls a small box around a feasible design infeasible; if so, its answers prove nothing.
 
     `find_exclusion` checks the equations; this checks the solver's own model of them, with its ranges and tolerances.
     """
@@ -167,10 +175,12 @@ def is_excluded_by_solver(question: Question, design: Mapping[str, float], clock
     verdicts = []
     for sign in question.possible_signs():
         nlp = question.program(sign)
-        near = tuple(
+        near_box = tuple(
             (max(lo, x - d), min(hi, x + d))
             for x, lo, hi in zip(point, nlp.lower, nlp.upper, strict=False)
-            for d in [_NEARBY * max(hi - lo, _MIN_RANGE * (1 + abs(x)))]
+            for d in [_HALF_WIDTH * max(hi - lo, _MIN_RANGE * (1 + abs(x)))]
         )
-        verdicts += [d.verdict for d in clock.race([make_task(nlp, min(_SHORT_SECONDS, clock.seconds_left), box=near)])]
+        verdicts += [
+            d.verdict for d in clock.race([make_task(nlp, min(_SHORT_SECONDS, clock.seconds_left), box=near_box)])
+        ]
     return all(verdict == INFEASIBLE for verdict in verdicts)

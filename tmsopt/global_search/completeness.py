@@ -1,4 +1,7 @@
-"""Finds all designs of a box with a pattern: drops boxes without one, proves that each other box holds exactly one."""
+"""Finds all designs with a pattern in a box of parameters, and proves that there are no others.
+
+Branch and prune drops each part of the box that holds no design, and proves that each other part holds exactly one.
+"""
 
 import math
 import time
@@ -37,12 +40,14 @@ SECONDS = 60.0
 _SINGULAR = "the equations are (nearly) singular there: the design is one of a continuum, or two designs meet"
 _TIME_OUT = "time limit reached"
 _STOPPED = "interrupted"
-_UNIT_FACTOR = 1.375  # on the usual unit: roots are often at 1, where small and large roots would meet
-_WORK_DIGITS, _ZERO_DIGITS, _RESULT_DIGITS = 60, 40, 25  # decimal digits: of arithmetic, of a zero, of a design
+_UNIT_FACTOR = (
+    1.375  # multiplies the usual unit of the roots; roots are often at 1, where small and large ones would meet
+)
+_WORK_DIGITS, _ZERO_DIGITS, _RESULT_DIGITS = 60, 40, 25  # decimal digits of the arithmetic, of a zero, of a design
 _BATCH = 1024  # boxes per turn, so that a turn takes about 0.1 s
-_MIN_WIDTH, _MAX_MIN_WIDTH = 1e-7, 1e-2  # of the first box: smaller boxes are not split; grows from first to second
-_SMALL_BOXES = 400  # so many small boxes hold no isolated designs; then the least width grows tenfold
-_MAX_PLACES = 12  # undecided places listed one by one
+_MIN_WIDTH, _MAX_MIN_WIDTH = 1e-7, 1e-2  # least width to split, relative to the first box; grows from first to second
+_SMALL_BOXES = 400  # more small boxes than these hold no isolated designs; the least width then grows tenfold
+_MAX_PLACES = 12  # more undecided places are merged into one
 
 
 @dataclass(frozen=True)
@@ -63,10 +68,10 @@ class Completeness:
     """Whether all designs of a box with a pattern are known.
 
     Attributes:
-        complete: whether it is proved that the box holds `designs` and no other.
+        complete: whether it is proved that the box holds `designs` and no others.
         reason: why it is not proved.
         designs: free parameters of each proved design, angles in radians.
-        limits: per design, the limit on which it lies within the digits carried; it may lie just beyond. Mostly empty.
+        limits: for each design, the limit on which it lies to all digits computed (it may lie just beyond), or empty.
         boxes: number of boxes that branch and prune handled.
         seconds: time used.
         undecided: the undecided parts of the box.
@@ -104,10 +109,10 @@ def prove_completeness(problem: Posed, seconds: float = SECONDS, progress: Count
             searches = [(system, *_build_conditions(system)) for system in _enumerate_systems(problem)]
         except (UnsupportedOperation, TypeError, ZeroDivisionError) as error:
             return Completeness(False, f"branch and prune does not support {error}")
-        run = _ZeroSearch(began + seconds, seconds, progress)
+        zero_search = _ZeroSearch(began + seconds, seconds, progress)
         for system, conditions, box in searches:
-            run.search(system, conditions, box)
-        return run.summarise(problem, time.perf_counter() - began)
+            zero_search.search(system, conditions, box)
+        return zero_search.summarise(problem, time.perf_counter() - began)
 
 
 @dataclass(frozen=True)
@@ -115,12 +120,12 @@ class _Zero:
     """A proved solution of a system.
 
     Attributes:
-        near: the box in which it is unique.
+        unique_box: the box that holds no other solution.
     """
 
     system: PatternSystem
     enclosure: Enclosure
-    near: Box
+    unique_box: Box
 
 
 @dataclass
@@ -135,49 +140,50 @@ class _ZeroSearch:
     zeros: list[_Zero] = field(default_factory=list)
     undecided: list[tuple[Box, str]] = field(default_factory=list)
 
-    def search(self, system: PatternSystem, conditions: BoxConditions, first: Box) -> None:
+    def search(self, system: PatternSystem, conditions: BoxConditions, first_box: Box) -> None:
         """Find all zeros of a system in its box."""
         zeros: list[_Zero] = []
-        whole = np.array(first).T[..., None]
-        boxes, small = whole, whole[..., :0]
-        most, least = _SMALL_BOXES, _MIN_WIDTH
+        whole_box = np.array(first_box).T[..., None]
+        boxes, small_boxes = whole_box, whole_box[..., :0]
+        max_small, min_width = _SMALL_BOXES, _MIN_WIDTH
         try:
-            while boxes.shape[-1] and least <= _MAX_MIN_WIDTH and not self.must_stop():
+            while boxes.shape[-1] and min_width <= _MAX_MIN_WIDTH and not self.must_stop():
                 self.boxes += boxes[..., -_BATCH:].shape[-1]
-                pruned = prune(conditions, boxes[..., -_BATCH:], least)
-                boxes = np.concatenate([boxes[..., :-_BATCH], pruned.remaining_factors], axis=-1)
-                failed = [
+                pruned = prune(conditions, boxes[..., -_BATCH:], min_width)
+                boxes = np.concatenate([boxes[..., :-_BATCH], pruned.remaining], axis=-1)
+                is_unproved = [
                     not _add_zero(zeros, system, *map(_as_box, pair)) for pair in np.moveaxis(pruned.proved, -1, 0)
                 ]
-                small = np.concatenate([small, pruned.small, pruned.proved[0][..., failed]], axis=-1)
-                if small.shape[-1] >= most:
-                    most, least = most + _SMALL_BOXES, 10 * least
+                small_boxes = np.concatenate([small_boxes, pruned.small, pruned.proved[0][..., is_unproved]], axis=-1)
+                if small_boxes.shape[-1] >= max_small:
+                    max_small, min_width = max_small + _SMALL_BOXES, 10 * min_width
         except KeyboardInterrupt:
-            self.stopped, boxes = _STOPPED, whole  # the current batch may be lost
+            self.stopped, boxes = _STOPPED, whole_box  # the current batch may be lost
         self.zeros += zeros
-        self.undecided += [(_as_box(box), _SINGULAR) for box in np.moveaxis(small, -1, 0)]
+        self.undecided += [(_as_box(box), _SINGULAR) for box in np.moveaxis(small_boxes, -1, 0)]
         self.undecided += [(_as_box(box), self.stopped or _SINGULAR) for box in np.moveaxis(boxes, -1, 0)]
 
     def must_stop(self) -> bool:
         """Whether the search was stopped or its time is over; reports progress."""
-        left = self.end - time.perf_counter()
+        seconds_left = self.end - time.perf_counter()
         if self.progress:
-            self.progress(min(self.seconds - left, self.seconds), self.seconds, f"{self.boxes:,} boxes")
-        self.stopped = self.stopped or (_TIME_OUT if left <= 0 else "")
+            self.progress(min(self.seconds - seconds_left, self.seconds), self.seconds, f"{self.boxes:,} boxes")
+        self.stopped = self.stopped or (_TIME_OUT if seconds_left <= 0 else "")
         return bool(self.stopped)
 
     def summarise(self, problem: Posed, seconds: float) -> Completeness:
-        """The result so far."""
+        """Collect the proved designs and the undecided places."""
         designs: list[tuple[Mapping[str, Any], str]] = []
         for zero in self.zeros:
-            at = {n: zero.enclosure.balls[n] for n in problem.free}
+            parameters = {n: zero.enclosure.balls[n] for n in problem.free}
             limit = _active_limits(zero)
-            if limit is not None and not any(all(at[n].overlaps(b[n]) for n in at) for b, _ in designs):
-                designs.append((at, limit))
+            if limit is not None and not any(all(parameters[n].overlaps(b[n]) for n in parameters) for b, _ in designs):
+                designs.append((parameters, limit))
         designs.sort(key=lambda pair: [float(x) for x in pair[0].values()])
-        of = problem.parameter_set
+        parameter_set = problem.parameter_set
         numbers = [
-            {n: number(x.atan() if of[n].tangent else x, _RESULT_DIGITS) for n, x in at.items()} for at, _ in designs
+            {n: number(x.atan() if parameter_set[n].tangent else x, _RESULT_DIGITS) for n, x in parameters.items()}
+            for parameters, _ in designs
         ]
         places = _merge_undecided(problem, self.undecided)
         undecided = tuple(Undecided(_parameter_ranges(problem, box), reason) for box, reason in places)
@@ -194,15 +200,15 @@ class _ZeroSearch:
         )
 
 
-def _add_zero(zeros: list[_Zero], system: PatternSystem, wide: Box, image: Box) -> bool:
-    """Prove the only zero of a box in balls and add it to `zeros` if it is new; False if the proof fails."""
-    if any(_is_inside(image, other.near) for other in zeros):
+def _add_zero(zeros: list[_Zero], system: PatternSystem, wide_box: Box, image_box: Box) -> bool:
+    """Prove the only zero of a box by ball arithmetic and add it to `zeros` if it is new; False if the proof fails."""
+    if any(_is_inside(image_box, proved_zero.unique_box) for proved_zero in zeros):
         return True
-    zero = _prove_zero(system, image)
-    at = [(zero.enclosure.balls[n],) * 2 for n in system.names] if zero else []
-    if zero is None or not _is_inside(at, wide):
+    zero = _prove_zero(system, image_box)
+    zero_box = [(zero.enclosure.balls[n],) * 2 for n in system.names] if zero else []
+    if zero is None or not _is_inside(zero_box, wide_box):
         return False
-    if not any(_is_inside(at, other.near) for other in zeros):
+    if not any(_is_inside(zero_box, proved_zero.unique_box) for proved_zero in zeros):
         zeros.append(zero)
     return True
 
@@ -219,16 +225,16 @@ def _enumerate_systems(problem: Posed) -> Iterator[PatternSystem]:
 
 
 def _build_conditions(system: PatternSystem) -> tuple[BoxConditions, Box]:
-    """Equations and limits of a system as plain data, and the box of its unknowns.
+    """Prepare the equations and limits of a system for pruning, and the box of its unknowns.
 
     Raises:
-        NotAccepted: for equations that branch and prune does not support.
+        UnsupportedOperation: for equations that branch and prune does not support.
     """
     box = tuple((outer_doubles(lo)[0], outer_doubles(hi)[1]) for lo, hi in _unknown_ranges(system))
     names = {n: symbol(n) for n in system.names}
     limits = [*fold(system.nonnegative, names, NODES), *fold(system.ascending, names, NODES)]
     for name, limit in system.limits.items():
-        with suppress(UnsupportedOperation):  # then the limit is only checked for each design found
+        with suppress(UnsupportedOperation):  # the limit is then only checked at each design
             limits.append(-system.problem.conditions[name].sign * fold(prepare_formula(limit), names, NODES)[0])
     formulas = (system.equations, formula(limits, system.names), system.shared)
     equations, limited, extra = (prepare_formula(multiply_out(f)) for f in formulas)
@@ -243,8 +249,10 @@ def _unknown_ranges(system: PatternSystem) -> list[tuple[Any, Any]]:
     for name, ends in problem.free.items():
         lo, hi = (flint.arb(problem.exactly({name: end})[name]) for end in ends)
         ranges.append((lo.tan(), hi.tan()) if problem.parameter_set[name].tangent else (lo, hi))
-    others = [(q.range.lower, q.range.upper) for q in system.lifted] + [r for p in system.pieces for r in p.ranges]
-    return ranges + [(flint.arb(low), flint.arb(high)) for low, high in others]
+    further_ranges = [(q.range.lower, q.range.upper) for q in system.lifted] + [
+        r for p in system.pieces for r in p.ranges
+    ]
+    return ranges + [(flint.arb(low), flint.arb(high)) for low, high in further_ranges]
 
 
 def _prove_zero(system: PatternSystem, box: Box) -> _Zero | None:
@@ -254,33 +262,33 @@ def _prove_zero(system: PatternSystem, box: Box) -> _Zero | None:
     try:
         function = partial(fold, system.equations, kind=BALLS)
         middle = refine_solution(function, start, system.names, _ZERO_DIGITS, units)
-        found = enclose_solution(function, middle, system.names, _ZERO_DIGITS, units)
+        enclosure = enclose_solution(function, middle, system.names, _ZERO_DIGITS, units)
     except (ProofFailed, ZeroDivisionError, ValueError):
         return None
-    around = {n: found.uniqueness * units.get(n, 1.0) for n in system.names}
-    near = [(middle[n] - r, middle[n] + r) for n, r in around.items()]
-    return _Zero(system, found, tuple((interval(lo)[1], interval(hi)[0]) for lo, hi in near))
+    distances = {n: enclosure.uniqueness * units.get(n, 1.0) for n in system.names}
+    unique_ranges = [(middle[n] - r, middle[n] + r) for n, r in distances.items()]
+    return _Zero(system, enclosure, tuple((interval(lo)[1], interval(hi)[0]) for lo, hi in unique_ranges))
 
 
-def _as_box(own: Array) -> Box:
+def _as_box(ends: Array) -> Box:
     """A box from its array of lower and upper ends."""
-    return tuple(zip(*own.tolist(), strict=True))
+    return tuple(zip(*ends.tolist(), strict=True))
 
 
-def _is_inside(box: Sequence[tuple[Any, Any]], other: Box) -> bool:
+def _is_inside(box: Sequence[tuple[Any, Any]], outer_box: Box) -> bool:
     """Whether a box certainly lies inside another; a ball may stand for both ends."""
-    return all(lo > low and hi < high for (lo, hi), (low, high) in zip(box, other, strict=True))
+    return all(lo > low and hi < high for (lo, hi), (low, high) in zip(box, outer_box, strict=True))
 
 
 def _active_limits(zero: _Zero) -> str | None:
-    """The limits on which a design lies within the digits carried, or empty; None if it violates a limit."""
+    """Name the limits on which a design lies to all digits computed, or empty; None if it violates a limit."""
     system, at = zero.system, zero.enclosure.balls
-    room: list[tuple[str, Any]] = []
+    margins: list[tuple[str, Any]] = []
     for name, (lo, hi) in zip(system.names, _unknown_ranges(system), strict=True):
         label = "" if name.startswith(":") else name
-        room += [(label and f"the least {label}", at[name] - lo), (label and f"the greatest {label}", hi - at[name])]
-    room += [("the edge of the pattern", x) for x in fold(system.nonnegative, at, BALLS)]
-    room += [("", x) for x in fold(system.ascending, at, BALLS)]
+        margins += [(label and f"the least {label}", at[name] - lo), (label and f"the greatest {label}", hi - at[name])]
+    margins += [("the edge of the pattern", x) for x in fold(system.nonnegative, at, BALLS)]
+    margins += [("", x) for x in fold(system.ascending, at, BALLS)]
     for name, condition in system.problem.conditions.items():
         if not condition.equality:
             excess = condition.sign * flint.arb(
@@ -290,26 +298,28 @@ def _active_limits(zero: _Zero) -> str | None:
                 middle = system.problem.ordered({n: float(at[n].mid()) for n in system.problem.free})
                 if not condition.violation(system.problem.values(middle)) <= 0:
                     return None
-            room.append((f"constraint {name}", -excess))
-    if any(x < 0 for _, x in room):
+            margins.append((f"constraint {name}", -excess))
+    if any(x < 0 for _, x in margins):
         return None
-    active = [label for label, x in room if label and not x > 0]
-    return ", ".join(active + ["a0 = 0"] * flint.arb(fold(system.leading, at, BALLS)[0]).contains(0))
+    active_limits = [label for label, x in margins if label and not x > 0]
+    return ", ".join(active_limits + ["a0 = 0"] * flint.arb(fold(system.leading, at, BALLS)[0]).contains(0))
 
 
 def _merge_undecided(problem: Posed, undecided: Iterable[tuple[Box, str]]) -> list[tuple[Box, str]]:
-    """Hulls, in the free parameters, of boxes that touch; one hull if there are many."""
+    """Merge boxes that touch into their hulls, in the free parameters; into one hull if there are many."""
     places: list[tuple[Box, str]] = []
     for box, reason in undecided:
-        own, rest = box[: len(problem.free)], []
-        for other, why in places:
-            if why == reason and all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(own, other, strict=True)):
-                own = _hull([own, other])
+        hull, separate_places = box[: len(problem.free)], []
+        for other_hull, other_reason in places:
+            if other_reason == reason and all(
+                a[0] <= b[1] and b[0] <= a[1] for a, b in zip(hull, other_hull, strict=True)
+            ):
+                hull = _hull([hull, other_hull])
             else:
-                rest.append((other, why))
-        places = [*rest, (own, reason)]
+                separate_places.append((other_hull, other_reason))
+        places = [*separate_places, (hull, reason)]
     if len(places) > _MAX_PLACES:
-        return [(_hull([own for own, _ in places]), "; ".join(dict.fromkeys(why for _, why in places)))]
+        return [(_hull([hull for hull, _ in places]), "; ".join(dict.fromkeys(text for _, text in places)))]
     return places
 
 
@@ -320,10 +330,10 @@ def _hull(boxes: Sequence[Box]) -> Box:
 
 def _parameter_ranges(problem: Posed, box: Box) -> Table[Ends]:
     """The ranges of the free parameters in a box, angles in radians instead of tangents."""
-    of = problem.parameter_set
+    parameter_set = problem.parameter_set
     return Table(
         {
-            n: (math.atan(lo), math.atan(hi)) if of[n].tangent else (lo, hi)
+            n: (math.atan(lo), math.atan(hi)) if parameter_set[n].tangent else (lo, hi)
             for n, (lo, hi) in zip(problem.free, box, strict=True)
         }
     )

@@ -1,4 +1,7 @@
-"""Root quantities for branch and bound: half-planes by interlacing, sectors by bounded factors."""
+"""Conditions on the roots for branch and bound: abscissa by interlacing, damping ratio by bounded factors.
+
+An abscissa keeps all roots in a half-plane, a damping ratio keeps them in a sector.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -25,12 +28,12 @@ _UNSCALED_DEGREE = 4  # up to here the powers of the unit stay near 1
 
 @dataclass(frozen=True)
 class Frame:
-    """Normalisation of the coefficients.
+    """How the coefficients of all cases are scaled and signed.
 
     Attributes:
         signs: case → sign of its leading coefficient; cases without a sign are left out.
         unit: typical size of the roots, a power of two.
-        needs_contact: whether a root must lie on the line; a problem that rewards a larger abscissa needs this.
+        needs_contact: whether a root must lie on the vertical line; needed if the problem rewards a larger abscissa.
         compact: whether squared frequencies are written as X/(1 − X).
         least_lead: lower bound on the size of the model's leading coefficient in the first case.
     """
@@ -43,13 +46,13 @@ class Frame:
     least_lead: float = 0.0
 
     def coefficients(self, values: Sequence[Values], case: int) -> list[Any]:
-        """Compact coefficients of a case for roots in the unit; the leading one is positive."""
+        """Coefficients of a case, for roots measured in `unit`; the leading one is positive."""
         a = compact_coefficients(self.model, values[case])
         return [self.signs[case] * c * self.lead / self.unit**k for k, c in enumerate(a)]
 
     @property
     def lead(self) -> float:
-        """Common factor of all coefficients; it balances small against large ones."""
+        """Common factor of all coefficients, so that neither the first nor the last ones become tiny."""
         return float(self.unit ** (self.model.degree // 2)) if self.model.degree > _UNSCALED_DEGREE else 1.0
 
     def shifted_coefficients(self, values: Sequence[Values], case: int, line: Any) -> list[Any]:
@@ -58,13 +61,13 @@ class Frame:
 
     def bound_roots(self, ranges: Sequence[Interval], first: bool) -> float:
         """Bound on the roots for coefficients in ranges; `first` marks the first case."""
-        (lower, upper), *others = ranges
+        (lower, upper), *other_ranges = ranges
         least = self.least_lead * self.lead if first else -math.inf
-        return bound_roots([(max(lower, least), max(upper, least)), *others])
+        return bound_roots([(max(lower, least), max(upper, least)), *other_ranges])
 
 
 def compact_coefficients(model: Model, values: Values) -> list[Any]:
-    """Coefficients up to a positive factor, in the model's shortest form."""
+    """Coefficients up to a common positive factor, in the shortest form that the model has."""
     with suppress(ZeroDivisionError):  # a parameter is fixed at 0
         if model.compact is not None:
             return model.compact(**model.algebraic({name: values[name] for name in model.sets[0].names}))
@@ -73,21 +76,25 @@ def compact_coefficients(model: Model, values: Values) -> list[Any]:
 
 def add_half_planes(frame: Frame, build: Builder, line: float | None = None) -> LiftedQuantity:
     """Require all roots of all cases at or left of a line; None makes the line a variable."""
-    first, covered, values = len(build.x), build.covered_cases, build.values
-    cases = [case for case in covered if case in frame.signs]
-    at: Any = line
-    if line is None:  # at most the largest root, unless a case that is left out has that root
-        most = frame.unit * max(
+    first_index, covered_cases, values = len(build.x), build.covered_cases, build.values
+    cases = [case for case in covered_cases if case in frame.signs]
+    line_position: Any = line
+    if line is None:  # the line is at most at the largest root, unless a case without a sign has that root
+        largest_root = frame.unit * max(
             frame.bound_roots(build.enclose(frame.coefficients(values, case)), case == cases[0]) for case in cases
         )
-        at = build.variable("abscissa", -most, most if len(values) == 1 or not frame.needs_contact else math.inf)
+        line_position = build.variable(
+            "abscissa", -largest_root, largest_root if len(values) == 1 or not frame.needs_contact else math.inf
+        )
     for case in cases:
-        c = frame.shifted_coefficients(values, case, at)
-        edges = add_interlacing(build, case, c, frame.bound_roots(build.enclose(c), case == covered[0]), frame.compact)
-        if line is None and frame.needs_contact and len(covered) == 1:
-            build.row("abscissa", math.prod(edges), 0.0, 0.0)
+        c = frame.shifted_coefficients(values, case, line_position)
+        contacts = add_interlacing(
+            build, case, c, frame.bound_roots(build.enclose(c), case == covered_cases[0]), frame.compact
+        )
+        if line is None and frame.needs_contact and len(covered_cases) == 1:
+            build.row("abscissa", math.prod(contacts), 0.0, 0.0)
     guess = partial(_guess_half_planes, frame, cases, line)
-    return LiftedQuantity(constant(at), AddedVariable("abscissa", len(build.x) - first, guess), (), ())
+    return LiftedQuantity(constant(line_position), AddedVariable("abscissa", len(build.x) - first_index, guess), (), ())
 
 
 def add_sectors(frame: Frame, build: Builder, ratio: float | None = None) -> LiftedQuantity:
@@ -97,9 +104,9 @@ def add_sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lif
     s² + pᵢ s + qᵢ, and qᵢ = wᵢ² is required for other ζ only: (1 + ζ)(wᵢ² − qᵢ) = 0. A fixed ζ = −1 requires nothing.
     An odd degree adds a factor s + d, with d ≥ 0 for other ζ only: (1 + ζ)(e − d) = 0, e ≥ 0, e ≥ d.
     """
-    first, covered, values = len(build.x), build.covered_cases, build.values
+    first_index, covered_cases, values = len(build.x), build.covered_cases, build.values
     zeta = build.variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
-    cases = [case for case in covered if case in frame.signs and (ratio is None or ratio > -1)]
+    cases = [case for case in covered_cases if case in frame.signs and (ratio is None or ratio > -1)]
 
     def require_at_least(greater: Any, least: Any) -> None:
         build.row("damping_ratio", greater - least, 0.0, np.inf)
@@ -111,68 +118,72 @@ def add_sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lif
 
     for case in cases:
         a = frame.coefficients(values, case)
-        largest = frame.bound_roots(build.enclose(a), case == covered[0])
-        pairs, monic = [], []
+        root_bound = frame.bound_roots(build.enclose(a), case == covered_cases[0])
+        pairs, factors = [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
-            p = build.variable(f"p{k}.{case}", -2 * largest, 2 * largest)
-            w = build.variable(f"w{k}.{case}", 0.0, largest)
-            q = build.variable(f"q{k}.{case}", -largest * largest, largest * largest) if ratio is None else w * w
+            p = build.variable(f"p{k}.{case}", -2 * root_bound, 2 * root_bound)
+            w = build.variable(f"w{k}.{case}", 0.0, root_bound)
+            q = (
+                build.variable(f"q{k}.{case}", -root_bound * root_bound, root_bound * root_bound)
+                if ratio is None
+                else w * w
+            )
             pairs.append(p)
-            monic.append([1, p, q])
+            factors.append([1, p, q])
             require_at_least(p, 2 * zeta * w)
             if ratio is None:
                 require_equal_unless_real(w * w, q)
         if len(a) % 2 == 0:
-            d = build.variable(f"d.{case}", 0.0 if ratio is not None else -largest, largest)
-            monic.append([1, d])
+            d = build.variable(f"d.{case}", 0.0 if ratio is not None else -root_bound, root_bound)
+            factors.append([1, d])
             if ratio is None:
-                require_equal_unless_real(build.variable(f"e.{case}", 0.0, largest), d)
-        for one, other in pairwise(pairs):  # fixes the order of the factors
-            require_at_least(other, one)
-        build.equal("damping_ratio", a, [a[0] * c for c in product(*monic)])
+                require_equal_unless_real(build.variable(f"e.{case}", 0.0, root_bound), d)
+        for smaller, larger in pairwise(pairs):  # fixes the order of the factors
+            require_at_least(larger, smaller)
+        build.equal("damping_ratio", a, [a[0] * c for c in product(*factors)])
     require_at_least(1, zeta)  # real roots would satisfy any larger ratio too
     guess = partial(_guess_sectors, frame, cases, ratio, build.scale.unit)
-    return LiftedQuantity(constant(zeta), AddedVariable("damping_ratio", len(build.x) - first, guess), (), ())
+    return LiftedQuantity(constant(zeta), AddedVariable("damping_ratio", len(build.x) - first_index, guess), (), ())
 
 
 def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
-    """Bound the factor coefficients of a pattern, the last variables so far: C(m, k) R^k for degree m."""
+    """Bound the coefficients of the factors of a pattern, the last variables: by C(m, k) R^k for degree m."""
     count = len(pattern.unknowns)
-    largest = bound_roots(build.enclose(compact_coefficients(frame.model, build.values[0]))) / build.scale.unit
+    root_bound = bound_roots(build.enclose(compact_coefficients(frame.model, build.values[0]))) / build.scale.unit
     symbols = build.x[-count:]
     for factor in pattern.factors(symbols):
         for k, c in enumerate(factor[1:], start=1):
             for j, symbol in enumerate(symbols):
                 if any(formula([c]) == formula([e]) for e in (symbol, -symbol)):
-                    most = math.comb(len(factor) - 1, k) * largest**k
+                    bound = math.comb(len(factor) - 1, k) * root_bound**k
                     lower, upper = build.bounds[j - count]
-                    build.bounds[j - count] = (max(lower, -most), min(upper, most))
+                    build.bounds[j - count] = (max(lower, -bound), min(upper, bound))
 
 
 def _guess_half_planes(
     frame: Frame, covered: Sequence[int], line: float | None, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
-    """The least line, unless it is fixed, and squared frequencies."""
-    at = max(float(values[case]["abscissa"]) for case in covered) if line is None else line
+    """Start values: the leftmost line, unless it is fixed, and the squared frequencies."""
+    line_position = max(float(values[case]["abscissa"]) for case in covered) if line is None else line
     squares = [
         x
         for case in covered
-        for x in squared_frequencies([float(c) for c in frame.shifted_coefficients(values, case, at)])
+        for x in squared_frequencies([float(c) for c in frame.shifted_coefficients(values, case, line_position)])
     ]
-    return [[*([at] if line is None else []), *(x / (1 + x) if frame.compact else x for x in squares)]]
+    return [[*([line_position] if line is None else []), *(x / (1 + x) if frame.compact else x for x in squares)]]
 
 
 def _guess_sectors(
     frame: Frame, covered: Sequence[int], ratio: float | None, unit: float, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
-    """The damping ratio, unless it is fixed, and the factors; roots come in the unit of the NLP."""
+    """Start values: the damping ratio, unless it is fixed, and the factors; `z` is in the unit of the NLP."""
     factors = []
     for case in covered:
-        split = pair_roots(z[case] * unit / frame.unit)
-        for p, q in sorted((float(-r.sum().real), float(r.prod().real)) for r in split if len(r) == 2):
-            unstable = q < 0 or (p < 0 and p * p >= 4 * q)  # a root s > 0
-            factors += [p, abs(p) / 2 if unstable else math.sqrt(q), *([q] if ratio is None else [])]
-        for d in (-float(r[0].real) for r in split if len(r) == 1):
+        root_groups = pair_roots(z[case] * unit / frame.unit)
+        for p, q in sorted((float(-r.sum().real), float(r.prod().real)) for r in root_groups if len(r) == 2):
+            is_unstable = q < 0 or (p < 0 and p * p >= 4 * q)  # a root s > 0
+            factors += [p, abs(p) / 2 if is_unstable else math.sqrt(q), *([q] if ratio is None else [])]
+        for d in (-float(r[0].real) for r in root_groups if len(r) == 1):
             factors += [d, abs(d)] if ratio is None else [d]
     if ratio is not None:
         return [factors]

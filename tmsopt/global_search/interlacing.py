@@ -1,10 +1,11 @@
-"""Stability by the Hermite–Biehler theorem, without factors and determinants.
+"""Conditions for stability by the Hermite–Biehler theorem, without factors and determinants.
 
-Let F(X) = c0 X^m − c2 X^(m−1) + … and S(X) = c1 X^l − c3 X^(l−1) + … be the two parts of p(iω), in X = ω². All roots of
-p, c0 > 0, lie in Re t ≤ 0 exactly if all c_k ≥ 0 and the roots of the two parts are real and interlace: there are
-x1 ≥ x2 ≥ … ≥ 0 with S(X) = c1 (X − x1)(X − x2)… and (−1)^j F(xj) ≥ 0. From degree 5 on, polynomials whose S has a
-multiple zero at which F vanishes satisfy this too; bounds stay valid. A quartic needs one unknown x, where two factors
-need four. For fixed x and a fixed line its conditions are linear: c3 = x c1 and c2 x ≥ c0 x² + c4.
+The coefficients c_k of p(t), with c0 > 0, form two polynomials in X = ω², which are the parts of p(iω): the first
+part F(X) = c0 X^m − c2 X^(m−1) + … and the second part S(X) = c1 X^l − c3 X^(l−1) + …. All roots of p lie in Re t ≤ 0
+exactly if all c_k ≥ 0 and the zeros of the two parts are real and interlace: there are x1 ≥ x2 ≥ … ≥ 0 with
+S(X) = c1 (X − x1)(X − x2)… and (−1)^j F(xj) ≥ 0. From degree 5 on, some polynomials with roots in Re t > 0 satisfy
+this too, if S has a multiple zero at which F vanishes; bounds stay valid. A quartic needs one unknown x, while two
+quadratic factors need four. For fixed x and a fixed line its conditions are linear: c3 = x c1 and c2 x ≥ c0 x² + c4.
 """
 
 import math
@@ -22,12 +23,14 @@ Square = tuple[Any, Any]
 
 
 def frequency_count(degree: int) -> int:
-    """Number of zeros of the second part of a polynomial."""
+    """Number of zeros of the second part of a polynomial of this degree."""
     return (degree - 1) // 2
 
 
 def interlacing_conditions(coefficients: Sequence[Any], squares: Sequence[Square]) -> tuple[list[Any], list[Any]]:
-    """Expressions that are 0, and expressions that are ≥ 0, if all roots have Re t ≤ 0; up to degree 4 only then.
+    """Expressions that are 0, and expressions that are ≥ 0, if all roots have Re t ≤ 0.
+
+    Up to degree 4 the converse holds too.
 
     Args:
         coefficients: descending; the leading one is positive.
@@ -59,15 +62,17 @@ def add_interlacing(
         compact: write the squares as X/(1 − X), which needs no bound on the roots.
 
     Returns:
-        Expressions ≥ 0, one of which can be 0 exactly if some root has Re t = 0.
+        Expressions ≥ 0; one of them can be 0 exactly if some root has Re t = 0.
     """
     degree = len(coefficients) - 1
     count = frequency_count(degree)
-    # The phase of p(iω) is least where all roots are at −R: degree · atan(ω/R), at the last frequency (degree − 2) π/2.
+    # The phase of p(iω) is least if all roots are at −R: degree · atan(ω/R), (degree − 2) π/2 at the last frequency.
     reach = max(1.0, math.tan(math.pi / 2 - math.pi / degree)) if degree > 4 else 1.0
-    most = 1.0 if compact else (largest * reach) ** 2
-    unknown = [build.variable(f"x{k}.{case}", 0.0, most) for k in range(1, count + 1)]
-    equations, nonnegative = interlacing_conditions(coefficients, [(x, 1 - x if compact else 1) for x in unknown])
+    largest_square = 1.0 if compact else (largest * reach) ** 2
+    unknown_squares = [build.variable(f"x{k}.{case}", 0.0, largest_square) for k in range(1, count + 1)]
+    equations, nonnegative = interlacing_conditions(
+        coefficients, [(x, 1 - x if compact else 1) for x in unknown_squares]
+    )
     for expression in equations:
         build.row("abscissa", expression, 0.0, 0.0)
     for expression in nonnegative:
@@ -77,7 +82,7 @@ def add_interlacing(
 
 
 def squared_frequencies(coefficients: Sequence[float]) -> list[float]:
-    """The squared frequencies that violate interlacing least, for coefficients as numbers."""
+    """The squared frequencies that violate the conditions least, for numeric coefficients."""
 
     def violation(squares: Sequence[float]) -> float:
         equations, nonnegative = interlacing_conditions(coefficients, [(x, 1.0) for x in squares])
@@ -87,12 +92,12 @@ def squared_frequencies(coefficients: Sequence[float]) -> list[float]:
 
 
 def _candidate_squares(coefficients: Sequence[float]) -> Iterator[list[float]]:
-    """Zeros of the second part; if that vanishes, values between the zeros of the first; and 0."""
+    """Yield the zeros of the second part; if it vanishes, values between the zeros of the first part; and all zeros."""
     count = frequency_count(len(coefficients) - 1)
     for part in (coefficients[1::2], coefficients[0::2]):
         alternating = np.array([c if k % 2 == 0 else -c for k, c in enumerate(part)])
-        found = np.roots(alternating) if np.any(alternating) else np.zeros(0)
-        squares = sorted((max(float(x.real), 0.0) for x in found), reverse=True)
+        zeros = np.roots(alternating) if np.any(alternating) else np.zeros(0)
+        squares = sorted((max(float(x.real), 0.0) for x in zeros), reverse=True)
         if len(squares) == count:
             yield squares
         elif len(squares) == count + 1:

@@ -1,8 +1,8 @@
 """The equations of a pattern in the parameters and a few bounded unknowns, so that no solution lies at infinity.
 
-Only the roots that the pattern ties are unknowns; division of p by their factors eliminates the others. Roots s with
-|s| ≤ 1 unit are unknowns themselves, larger ones enter as 1/s in the reversed polynomial. So each unknown has a range,
-whatever the leading coefficient, and no equation has a quotient.
+Only the roots that the pattern ties together are unknowns; division of p by their factors eliminates the others. A root
+s with |s| ≤ 1 unit is an unknown itself, a larger one enters as 1/s in the reversed polynomial. So each unknown has a
+range for any leading coefficient, and no equation has a quotient.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,29 +28,29 @@ from tmsopt.roots.polynomial import characteristic_polynomial
 Ends = tuple[float, float]
 
 _ROUNDING = 1e-9  # relative: more than the roundings of a few sums
-_ORDER_WEIGHT = Fraction(3, 4)  # b + 3c/4 orders the factors of one kind; two factors rarely share it
+_ORDER_WEIGHT = Fraction(3, 4)  # factors of one kind are ordered by b + 3c/4, which two factors rarely share
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A power of a factor of a pattern.
+    """A power of one factor of a pattern.
 
     Attributes:
         kind: ``root``, ``pair``, ``meeting`` (two real roots), ``axis`` or ``zero``; for a complex H ``point``, or
             ``line`` for a root on the imaginary axis.
         order: the power.
-        outer: whether the factor is one in 1/s.
-        first: index of its first unknown.
+        outer: whether its roots are large, so that the factor is a polynomial in 1/s.
+        first_index: index of its first unknown.
     """
 
     kind: str
     order: int
     outer: bool
-    first: int
+    first_index: int
 
     @property
     def ranges(self) -> tuple[Ends, ...]:
-        """Range of each unknown, since no root is larger than 1."""
+        """Range of each unknown, since no root s (or 1/s) is larger than 1."""
         return {
             "root": ((-1.0, 1.0),),
             "pair": ((-2.0, 2.0), (0.0, 1.0)),
@@ -63,7 +63,7 @@ class Piece:
 
     def own_unknowns(self, unknowns: Sequence[Any]) -> Sequence[Any]:
         """Its unknowns among all unknowns."""
-        return unknowns[self.first : self.first + len(self.ranges)]
+        return unknowns[self.first_index : self.first_index + len(self.ranges)]
 
     def monic(self, unknowns: Sequence[Any]) -> list[Any]:
         """Coefficients of the monic factor, in s or 1/s, descending."""
@@ -80,12 +80,12 @@ class Piece:
         return [1, *u]
 
     def order_key(self, unknowns: Sequence[Any]) -> Any:
-        """The key that ascends among interchangeable factors."""
+        """The number by which interchangeable factors are ordered."""
         u = self.own_unknowns(unknowns)
         return u[0] if len(u) == 1 else u[0] + _ORDER_WEIGHT * u[1]
 
     def nonnegative(self, unknowns: Sequence[Any]) -> list[Any]:
-        """Further expressions that must be ≥ 0."""
+        """Expressions that must be ≥ 0, so that the roots are of this kind."""
         u = self.own_unknowns(unknowns)
         if self.kind == "pair":
             return [4 * u[1] - u[0] * u[0]]
@@ -95,7 +95,7 @@ class Piece:
 
 
 def enumerate_pieces(name: str, complex_h: bool) -> Iterator[tuple[Piece, ...]]:
-    """All choices of small and large roots of a pattern.
+    """Yield all choices of small and large roots of a pattern.
 
     Args:
         complex_h: whether the unknowns are eigenvalues of a complex H, which are all small; `name` is then the
@@ -103,13 +103,13 @@ def enumerate_pieces(name: str, complex_h: bool) -> Iterator[tuple[Piece, ...]]:
     """
     for choice in product(*(list(_part_pieces(part, complex_h)) for part in parse_components(name))):
         pieces: list[Piece] = []
-        for kind, order, outer in (piece for way in choice for piece in way):
+        for kind, order, outer in (piece for part_pieces in choice for piece in part_pieces):
             pieces.append(Piece(kind, order, outer, sum(len(p.ranges) for p in pieces)))
         yield tuple(pieces)
 
 
 def _part_pieces(part: Component, complex_h: bool) -> Iterator[list[tuple[str, int, bool]]]:
-    """Choices of (kind, power, outer) for the factors of a part."""
+    """Yield the choices of (kind, power, outer) for the factors of one part of a pattern."""
     if complex_h:
         yield [("point", part.order, False) if part.kind == "CEP" else ("line", part.roots // 2, False)] * part.count
     elif part.kind == "capsize":
@@ -135,40 +135,42 @@ class RotatingFrame:
 
 
 def find_rotating_frame(problem: Posed) -> RotatingFrame | None:
-    """The frame of a complex H by Gershgorin discs over the box; None if they are unbounded, or for a real model.
+    """Find the frame of a complex H by Gershgorin discs over the box; None if they are unbounded, or for a real model.
 
     Raises:
-        NotAccepted: for an operation without interval arithmetic.
+        UnsupportedOperation: for an operation without interval arithmetic.
     """
     if problem.model.double is None:
         return None
     names = tuple(problem.free)
     rows = _complex_matrix(problem, {**problem.as_nodes(problem.fixed), **{n: symbol(n) for n in names}})
     entries = formula((part for row in rows for x in row for part in (x.re, x.im)), names)
-    found = np.array(ranges(entries, [round_outwards(*ends) for ends in problem.free.values()]))
-    if not np.isfinite(found).all():
+    entry_ranges = np.array(ranges(entries, [round_outwards(*ends) for ends in problem.free.values()]))
+    if not np.isfinite(entry_ranges).all():
         return None
     n = len(rows)
-    own = found.reshape(n, n, 2, 2)
-    centre = float(-own[range(n), range(n), 1].mean())
-    own[range(n), range(n), 1] += centre
-    reach = np.hypot(*np.moveaxis(np.abs(own).max(axis=3), 2, 0)).sum(axis=1).max() + _ROUNDING * abs(centre)
+    intervals = entry_ranges.reshape(n, n, 2, 2)
+    centre = float(-intervals[range(n), range(n), 1].mean())
+    intervals[range(n), range(n), 1] += centre
+    reach = np.hypot(*np.moveaxis(np.abs(intervals).max(axis=3), 2, 0)).sum(axis=1).max() + _ROUNDING * abs(centre)
     return RotatingFrame(Fraction(centre), Fraction(reach * (1 + _ROUNDING) or 1.0))
 
 
-def _complex_matrix(problem: Posed, own: Mapping[str, Any]) -> list[list[Pair]]:
+def _complex_matrix(problem: Posed, parameters: Mapping[str, Any]) -> list[list[Pair]]:
     """The matrix −i H of a model with a complex H."""
     assert problem.model.double is not None
-    _, rows = problem.model.double(problem.parameter_set.native(own))  # [[−J, −R], [R, −J]] of H = R + i J
+    _, rows = problem.model.double(problem.parameter_set.native(parameters))  # [[−J, −R], [R, −J]] of H = R + i J
     n = len(rows) // 2
     return [[Pair(-row[j], row[n + j]) for j in range(n)] for row in rows[:n]]
 
 
-def _complex_coefficients(problem: Posed, own: Mapping[str, Any], frame: RotatingFrame) -> list[Any]:
+def _complex_coefficients(problem: Posed, parameters: Mapping[str, Any], frame: RotatingFrame) -> list[Any]:
     """Coefficients of the characteristic polynomial of −i H in a frame."""
-    rows = _complex_matrix(problem, own)
-    moved = [[x + Pair(0, frame.centre) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(rows)]
-    return [c / frame.unit**k if k else c for k, c in enumerate(characteristic_polynomial(moved))]
+    rows = _complex_matrix(problem, parameters)
+    shifted_rows = [
+        [x + Pair(0, frame.centre) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(rows)
+    ]
+    return [c / frame.unit**k if k else c for k, c in enumerate(characteristic_polynomial(shifted_rows))]
 
 
 def values_at(
@@ -179,35 +181,40 @@ def values_at(
     Args:
         lifted: quantities that are unknowns.
         at: parameters (angles as tangents) and lifted quantities by name.
-        constants: parameters as they are, which take precedence over `at`.
+        constants: parameters by name, angles as angles; they take precedence over `at`.
     """
-    of, known = problem.parameter_set, {q.name for q in lifted}
-    own = {n: constants[n] if n in constants else atan(at[n]) if of[n].tangent else at[n] for n in of.names}
-    return Values(problem.model, of, own, lift=lambda q, v: at[q.name] if q.name in known else None)
+    parameter_set, lifted_names = problem.parameter_set, {q.name for q in lifted}
+    parameters = {
+        n: constants[n] if n in constants else atan(at[n]) if parameter_set[n].tangent else at[n]
+        for n in parameter_set.names
+    }
+    return Values(
+        problem.model, parameter_set, parameters, lift=lambda q, v: at[q.name] if q.name in lifted_names else None
+    )
 
 
 def extra_equations(
     values: Values, lifted: Sequence[Quantity], equalities: Sequence[Expression], at: Mapping[str, Any]
 ) -> list[Any]:
-    """Left sides of the equations that do not belong to the pattern: lifted quantities and == constraints."""
-    left = [values.fold(q.left_side, {q.name: at[q.name]})[0] for q in lifted if q.equation]
-    return left + [e(values) for e in equalities]
+    """Left sides of the equations for lifted quantities and == constraints, which the pattern does not imply."""
+    left_sides = [values.fold(q.left_side, {q.name: at[q.name]})[0] for q in lifted if q.equation]
+    return left_sides + [e(values) for e in equalities]
 
 
 @dataclass(frozen=True)
 class PatternSystem:
     """The equations of a pattern for one choice of small and large roots.
 
-    Parameters and lifted quantities keep their names, an angle stands for its tangent; the unknowns of the pattern are
-    ``:0``, ``:1`` and so on.
+    Parameters and lifted quantities keep their names, but the number for an angle is its tangent. The unknowns of the
+    pattern are ``:0``, ``:1`` and so on. A lifted quantity is an unknown with an equation of its own.
 
     Attributes:
         names: all unknowns.
         lifted: the quantities among them.
         equations: left sides, as many as unknowns.
-        shared: further left sides, needed because roots of size 1 count as small and as large.
-        nonnegative: must be ≥ 0, so that the unknowns fit the pattern.
-        ascending: must be ≥ 0, which fixes the order of interchangeable factors.
+        shared: further left sides, needed because a root of size 1 counts as small and as large.
+        nonnegative: expressions that must be ≥ 0, so that the unknowns fit the pattern.
+        ascending: expressions that must be ≥ 0, which fixes the order of interchangeable factors.
         leading: the leading coefficient.
         limits: left minus right side of each inequality.
     """
@@ -227,7 +234,7 @@ class PatternSystem:
 def build_system(
     problem: Posed, pieces: tuple[Piece, ...], scale: Scale | RotatingFrame, lifted: tuple[Quantity, ...]
 ) -> PatternSystem:
-    """The system of some factors.
+    """Build the system of equations for these factors.
 
     Args:
         scale: scale of roots and coefficients, or the frame of a complex H.
@@ -236,9 +243,9 @@ def build_system(
     unknowns = tuple(f":{k}" for k in range(sum(len(p.ranges) for p in pieces)))
     names = (*problem.free, *(q.name for q in lifted), *unknowns)
     at = {n: symbol(n) for n in names}
-    u = [at[n] for n in unknowns]
+    pattern_unknowns = [at[n] for n in unknowns]
     values = values_at(problem, lifted, at, problem.as_nodes(problem.fixed))
-    if (abscissa := _abscissa(problem, pieces, scale, u)) is not None:
+    if (abscissa := _abscissa(problem, pieces, scale, pattern_unknowns)) is not None:
         values = values.with_known({"abscissa": abscissa})
     if isinstance(scale, RotatingFrame):
         a = _complex_coefficients(problem, values.given[2], scale)
@@ -246,20 +253,22 @@ def build_system(
         lead, unit = Fraction(scale.lead), Fraction(scale.unit)
         a = [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
     equalities = [c for c in problem.conditions.values() if c.equality]
-    own = [x for piece in pieces for x in piece.nonnegative(u)]
-    alike = [(p, q) for p, q in pairwise(pieces) if (p.kind, p.order, p.outer) == (q.kind, q.order, q.outer)]
+    nonnegative = [x for piece in pieces for x in piece.nonnegative(pattern_unknowns)]
+    interchangeable = [(p, q) for p, q in pairwise(pieces) if (p.kind, p.order, p.outer) == (q.kind, q.order, q.outer)]
     limits = {n: c for n, c in problem.conditions.items() if not c.equality and all(name in values for name in c.names)}
-    left = divisibility_conditions(a, pieces, u)
-    real = [part for x in left for part in ((x.re, x.im) if isinstance(x, Pair) else (x,))]
+    conditions = divisibility_conditions(a, pieces, pattern_unknowns)
+    real_conditions = [part for x in conditions for part in ((x.re, x.im) if isinstance(x, Pair) else (x,))]
     return PatternSystem(
         problem,
         pieces,
         names,
         lifted,
-        equations=formula([*real, *extra_equations(values, lifted, equalities, at)], names),
-        shared=formula(shared_conditions(a, pieces, u), names),
-        nonnegative=formula(own, names),
-        ascending=formula((q.order_key(u) - p.order_key(u) for p, q in alike), names),
+        equations=formula([*real_conditions, *extra_equations(values, lifted, equalities, at)], names),
+        shared=formula(shared_conditions(a, pieces, pattern_unknowns), names),
+        nonnegative=formula(nonnegative, names),
+        ascending=formula(
+            (q.order_key(pattern_unknowns) - p.order_key(pattern_unknowns) for p, q in interchangeable), names
+        ),
         leading=formula([values.coefficients[0]], names),
         limits={n: formula([c(values)], names) for n, c in limits.items()},
     )
@@ -270,54 +279,57 @@ def _abscissa(problem: Posed, pieces: Sequence[Piece], scale: Scale | RotatingFr
     if problem.pattern is None or problem.pattern.abscissa is None:
         return None
     (piece,) = pieces
-    unit, own = Fraction(scale.unit), piece.own_unknowns(u)
+    unit, own_unknowns = Fraction(scale.unit), piece.own_unknowns(u)
     if piece.kind in ("root", "point"):
-        return quotient(unit, own[0]) if piece.outer else unit * own[0]
-    return quotient(-unit * own[0], 2 * own[1]) if piece.outer else -unit * own[0] / 2
+        return quotient(unit, own_unknowns[0]) if piece.outer else unit * own_unknowns[0]
+    return quotient(-unit * own_unknowns[0], 2 * own_unknowns[1]) if piece.outer else -unit * own_unknowns[0] / 2
 
 
 def divisibility_conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
     """Expressions that vanish exactly if the powers of the factors divide a polynomial.
 
-    If the factors make up the whole polynomial, coefficients minus those of the product, which have fewer terms;
-    otherwise the remainders, for small and for large roots separately. See `shared_conditions`.
+    If the factors make up the whole polynomial, these are its coefficients minus those of the product, which have fewer
+    terms. Otherwise they are the remainders, for small and for large roots separately; see `shared_conditions`.
     """
-    left: list[Any] = []
+    conditions: list[Any] = []
     for outer in (False, True):
-        rest = a[::-1] if outer else a
+        dividend = a[::-1] if outer else a
         factors = [p.monic(unknowns) for p in pieces if p.outer == outer for _ in range(p.order)]
-        whole = multiplied(*factors)
-        if len(whole) == len(a):
-            return left + [c - rest[0] * f for c, f in zip(rest[1:], whole[1:], strict=True)]
+        factor_product = multiplied(*factors)
+        if len(factor_product) == len(a):
+            return conditions + [c - dividend[0] * f for c, f in zip(dividend[1:], factor_product[1:], strict=True)]
         for factor in factors:
-            rest, remainder = divide(rest, factor)
-            left += remainder
-    return left
+            dividend, remainder = divide(dividend, factor)
+            conditions += remainder
+    return conditions
 
 
 def shared_conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
     """The condition that `divisibility_conditions` omits: a small and a large root of size 1 are two roots.
 
-    The remainders of the quotient by the small factors, divided by the large ones; none if all factors are of one kind.
+    The polynomial is divided by the small factors, and the quotient by the large ones; these are the remainders. There
+    are none if all factors are small or all are large.
     """
-    inner, outer = ([p.monic(unknowns) for p in pieces if p.outer == o for _ in range(p.order)] for o in (False, True))
-    left: list[Any] = []
-    if inner and outer:
-        for factor in inner:
+    inner_factors, outer_factors = (
+        [p.monic(unknowns) for p in pieces if p.outer == o for _ in range(p.order)] for o in (False, True)
+    )
+    conditions: list[Any] = []
+    if inner_factors and outer_factors:
+        for factor in inner_factors:
             a, _ = divide(a, factor)
         a = a[::-1]
-        for factor in outer:
+        for factor in outer_factors:
             a, remainder = divide(a, factor)
-            left += remainder
-    return left
+            conditions += remainder
+    return conditions
 
 
 def divide(a: Sequence[Any], monic: Sequence[Any]) -> tuple[list[Any], list[Any]]:
     """Quotient and remainder by a monic polynomial, coefficients descending."""
-    rest = list(a)
+    dividend = list(a)
     count = len(a) - len(monic) + 1
     for k in range(count):
         for j, f in enumerate(monic[1:], start=1):
             if not (isinstance(f, int) and f == 0):
-                rest[k + j] = rest[k + j] - rest[k] * f
-    return rest[:count], rest[count:]
+                dividend[k + j] = dividend[k + j] - dividend[k] * f
+    return dividend[:count], dividend[count:]

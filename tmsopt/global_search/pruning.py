@@ -1,7 +1,9 @@
-"""Branch and prune by interval arithmetic on many boxes at once, in doubles rounded outward.
+"""Prunes many boxes at once by interval arithmetic, in doubles rounded outward.
 
-The first axis of an array holds the lower and the upper ends. NaN ends, such as those of 0 · ∞, become infinite: an
-interval may be too wide, never too narrow.
+A box is a range for each variable. Pruning contracts it, splits it, or proves that it holds no zero or exactly one.
+
+The first axis of an array holds the lower and the upper ends. NaN ends, such as those of 0 · ∞, become infinite, since
+an interval may be too wide but never too narrow.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,11 +36,11 @@ from tmsopt.records import Array, Truth
 Box = tuple[tuple[float, float], ...]
 """Least and greatest value of each variable."""
 
-_TINY = 1e-300  # exceeds any loss by underflow
-_GAIN = 0.5  # of a width: a box with a side shrunk below this is contracted again, not split
-_FEW = 64  # boxes; so many take hardly longer than one
-_MARGIN = 0.1  # of a width: Newton's box extends so far beyond each end
-_MIN_MARGIN = 1e-12  # of the first box: at least so far
+_TINY = 1e-300  # larger than any loss by underflow
+_GAIN = 0.5  # relative to a width: a box with a side shrunk below this is contracted again instead of split
+_MIN_BOXES = 64  # fewer boxes are split repeatedly, since this many take hardly longer than one
+_MARGIN = 0.1  # relative to a width: how far Newton's box extends beyond each end
+_MIN_MARGIN = 1e-12  # relative to the first box: least value of that margin
 
 
 @dataclass(frozen=True)
@@ -46,10 +48,10 @@ class BoxConditions:
     """The conditions to satisfy in a box.
 
     Attributes:
-        equations: must be 0; as many as variables.
-        limits: must be ≥ 0.
-        widths: of the first box; 1 for an infinite one.
-        extra: must be 0 too.
+        equations: expressions that must be 0, as many as variables.
+        limits: expressions that must be ≥ 0.
+        widths: width of the first box in each variable; 1 where it is infinite.
+        extra: further expressions that must be 0.
     """
 
     equations: Formula
@@ -64,55 +66,62 @@ class PrunedBoxes:
 
     Attributes:
         remaining: parts that may hold zeros.
-        proved: a first axis holds boxes with exactly one zero, and their parts that hold it.
+        proved: pairs along a first axis: boxes with exactly one zero, and their parts that hold the zero.
         small: parts that may hold zeros and are too small to split.
     """
 
-    remaining_factors: Array
+    remaining: Array
     proved: Array
     small: Array
 
 
-def prune(conditions: BoxConditions, x: Array, least: float) -> PrunedBoxes:
+def prune(conditions: BoxConditions, x: Array, min_width: float) -> PrunedBoxes:
     """Contract boxes once, drop those without a zero, and split those that hardly shrink.
 
     Args:
         x: boxes, of shape (2, variables, boxes).
-        least: boxes narrower than this share of the first box are not split.
+        min_width: least width to split, relative to the first box.
     """
     with np.errstate(all="ignore"):
-        before = x[1] - x[0]
+        widths = x[1] - x[0]
         for graph, target in ((conditions.equations, 0.0), (conditions.extra, 0.0), (conditions.limits, np.inf)):
-            x, possible = _contract(graph, x, target)
-            x, before = x[..., possible], before[:, possible]
-        wide, image, single, weights = _apply_newton(conditions, x)
-        x = _intersect(x, image)
-        possible = (x[0] <= x[1]).all(axis=0)
-        shown, keep = possible & single, possible & ~single
-        contract_again = keep & (x[1] - x[0] < _GAIN * before).any(axis=0)
-        cut = keep & ~contract_again
-        parts, small = _split_boxes(x[..., cut], weights[:, cut], least * _as_column(conditions.widths))
+            x, may_hold_zero = _contract(graph, x, target)
+            x, widths = x[..., may_hold_zero], widths[:, may_hold_zero]
+        wide_boxes, image_boxes, has_one_zero, weights = _apply_newton(conditions, x)
+        x = _intersect(x, image_boxes)
+        may_hold_zero = (x[0] <= x[1]).all(axis=0)
+        is_proved, is_open = may_hold_zero & has_one_zero, may_hold_zero & ~has_one_zero
+        contract_again = is_open & (x[1] - x[0] < _GAIN * widths).any(axis=0)
+        must_split = is_open & ~contract_again
+        parts, small = _split_boxes(
+            x[..., must_split], weights[:, must_split], min_width * _as_column(conditions.widths)
+        )
         return PrunedBoxes(
-            np.concatenate([x[..., contract_again], parts], axis=-1), np.stack([wide, image])[..., shown], small
+            np.concatenate([x[..., contract_again], parts], axis=-1),
+            np.stack([wide_boxes, image_boxes])[..., is_proved],
+            small,
         )
 
 
-def _split_boxes(x: Array, weights: Array, least: Array) -> tuple[Array, Array]:
-    """Halves of boxes along the side of greatest weight, a few boxes repeatedly; and the boxes too small to split."""
+def _split_boxes(x: Array, weights: Array, min_width: Array) -> tuple[Array, Array]:
+    """Halve boxes along the side of greatest weight, repeatedly if they are few; also returns those too small."""
     parts, small = x, x[..., :0]
     while True:
         width = parts[1] - parts[0]
         middle = parts[0] + width / 2
-        across = (width > least) & (width < np.inf) & (parts[0] < middle) & (middle < parts[1])
-        cut = across.any(axis=0)
-        small = np.concatenate([small, parts[..., ~cut]], axis=-1)
-        at = np.where(across, weights, -1.0).argmax(axis=0)[cut], np.arange(np.count_nonzero(cut))
-        lower, weights = parts[..., cut], weights[:, cut]
+        can_split = (width > min_width) & (width < np.inf) & (parts[0] < middle) & (middle < parts[1])
+        is_splittable = can_split.any(axis=0)
+        small = np.concatenate([small, parts[..., ~is_splittable]], axis=-1)
+        cut_sides = (
+            np.where(can_split, weights, -1.0).argmax(axis=0)[is_splittable],
+            np.arange(np.count_nonzero(is_splittable)),
+        )
+        lower, weights = parts[..., is_splittable], weights[:, is_splittable]
         upper = lower.copy()
-        lower[1][at] = upper[0][at] = middle[:, cut][at]
-        weights[at] /= 2
+        lower[1][cut_sides] = upper[0][cut_sides] = middle[:, is_splittable][cut_sides]
+        weights[cut_sides] /= 2
         parts, weights = np.concatenate([lower, upper], axis=-1), np.concatenate([weights, weights], axis=-1)
-        if not 0 < parts.shape[-1] < _FEW:
+        if not 0 < parts.shape[-1] < _MIN_BOXES:
             return parts, small
 
 
@@ -125,48 +134,53 @@ def _apply_newton(conditions: BoxConditions, x: Array) -> tuple[Array, Array, Tr
     is exactly one (Neumaier 1990, theorem 5.1.7).
 
     Returns:
-        The wider boxes; parts that hold all their zeros; whether there is exactly one; and per variable the weight of
-        its width in the equations, at most 1 each.
+        The wider boxes; their parts that hold all zeros; whether there is exactly one zero; and for each variable the
+        weight of its width in the equations, at most 1 for each equation.
     """
-    first = _as_column(conditions.widths)
-    room = _MARGIN * (x[1] - x[0]) + _MIN_MARGIN * first
-    wide = np.stack([x[0] - room, x[1] + room])
-    middle = (wide[0] + wide[1]) / 2
-    reach = np.maximum(wide[1] - middle, middle - wide[0]) * (1 + UNIT) + _TINY
-    found = _evaluate_ranges(conditions.equations, np.stack([middle, middle]))
-    outputs = [np.broadcast_to(found[o], wide[:, 0].shape) for o in conditions.equations.outputs]
+    first_widths = _as_column(conditions.widths)
+    margin = _MARGIN * (x[1] - x[0]) + _MIN_MARGIN * first_widths
+    wide_boxes = np.stack([x[0] - margin, x[1] + margin])
+    middle = (wide_boxes[0] + wide_boxes[1]) / 2
+    reach = np.maximum(wide_boxes[1] - middle, middle - wide_boxes[0]) * (1 + UNIT) + _TINY
+    step_ranges = _evaluate_ranges(conditions.equations, np.stack([middle, middle]))
+    outputs = [np.broadcast_to(step_ranges[o], wide_boxes[:, 0].shape) for o in conditions.equations.outputs]
     values = np.stack(outputs, axis=1)[:, :, None]
-    slopes = _evaluate_slopes(conditions.equations, wide)
+    slopes = _evaluate_slopes(conditions.equations, wide_boxes)
     centre = np.moveaxis((slopes[0] + slopes[1]) / 2, -1, 0)
-    size = np.linalg.det(centre)
-    centre[~np.isfinite(size) | (size == 0)] = np.eye(len(first))  # any matrix will do
+    determinants = np.linalg.det(centre)
+    is_singular = ~np.isfinite(determinants) | (determinants == 0)
+    centre[is_singular] = np.eye(len(first_widths))  # the bounds hold for any matrix
     inverse = np.moveaxis(np.linalg.inv(centre), 0, -1)
     preconditioned = _bound_moves(_multiply_matrices(inverse, slopes), _multiply_matrices(inverse, values), reach)
     moves = np.concatenate([_bound_moves(slopes, values, reach), preconditioned], axis=1)
     image = _widen(middle + np.stack([moves[0].max(axis=0), moves[1].min(axis=0)]))
-    own = np.einsum("ekkm->ekm", preconditioned)
-    around = _widen(middle + own)
-    single = (np.abs(own).max(axis=0) < reach * (1 - 4 * UNIT)) & (around[0] > wide[0]) & (around[1] < wide[1])
+    diagonal = np.einsum("ekkm->ekm", preconditioned)
+    zero_ranges = _widen(middle + diagonal)
+    has_one_zero = (
+        (np.abs(diagonal).max(axis=0) < reach * (1 - 4 * UNIT))
+        & (zero_ranges[0] > wide_boxes[0])
+        & (zero_ranges[1] < wide_boxes[1])
+    )
     parts = np.abs(slopes).max(axis=0) * reach
     smear = (parts / np.maximum(parts.sum(axis=1, keepdims=True), _TINY)).sum(axis=0)
-    share = np.minimum((x[1] - x[0]) / np.maximum(first, _TINY), 1.0)
+    share = np.minimum((x[1] - x[0]) / np.maximum(first_widths, _TINY), 1.0)
     weights = np.where(np.isfinite(smear), smear + 1e-3 * share, share)
-    return wide, image, single.all(axis=0), weights
+    return wide_boxes, image, has_one_zero.all(axis=0), weights
 
 
 def _bound_moves(matrix: Array, values: Array, reach: Array) -> Array:
-    """Moves of each variable, up to `reach`, that each equation matrix · move + value = 0 allows."""
-    parts = np.abs(matrix).max(axis=0) * reach
+    """Moves of each variable, up to `reach`, that each equation (matrix · move + value = 0) allows."""
+    terms = np.abs(matrix).max(axis=0) * reach
     growth = 1 + (len(reach) + 4) * UNIT
-    rest = parts.sum(axis=1, keepdims=True) * growth - parts / growth + _TINY  # of all variables but one
-    return _divide(_widen(np.stack([-values[1] - rest, -values[0] + rest])), matrix)
+    other_terms = terms.sum(axis=1, keepdims=True) * growth - terms / growth + _TINY  # of all variables but one
+    return _divide(_widen(np.stack([-values[1] - other_terms, -values[0] + other_terms])), matrix)
 
 
 def _multiply_matrices(exact: Array, x: Array) -> Array:
-    """Products of matrices of doubles with matrices of intervals; rounding is bounded for any order of summation."""
+    """Multiply matrices of doubles by matrices of intervals; the rounding bound holds for any order of summation."""
     middle, rounding = (x[0] + x[1]) / 2, (len(exact) + 4) * UNIT
     reach = (x[1] - x[0]) * (0.5 + UNIT) + rounding * np.abs(middle) + _TINY
-    centre, error = (np.einsum("ijm,jkm->ikm", *own) for own in ((exact, middle), (np.abs(exact), reach)))
+    centre, error = (np.einsum("ijm,jkm->ikm", *matrices) for matrices in ((exact, middle), (np.abs(exact), reach)))
     error = error * (1 + rounding) + _TINY
     return _widen(np.stack([centre - error, centre + error]))
 
@@ -180,12 +194,12 @@ def _as_column(numbers: Sequence[float]) -> Array:
 
 def _widen(x: Array) -> Array:
     """Move the ends outward by more than one rounding, in place; NaN becomes infinite."""
-    room = np.abs(x) * UNIT + _TINY
-    x[0] -= room[0]
-    x[1] += room[1]
-    unknown = np.isnan(x)
-    if unknown.any():
-        x[0][unknown[0]], x[1][unknown[1]] = -np.inf, np.inf
+    margin = np.abs(x) * UNIT + _TINY
+    x[0] -= margin[0]
+    x[1] += margin[1]
+    is_nan = np.isnan(x)
+    if is_nan.any():
+        x[0][is_nan[0]], x[1][is_nan[1]] = -np.inf, np.inf
     return x
 
 
@@ -206,14 +220,14 @@ def _negate(a: Array) -> Array:
 
 
 def _multiply(a: Array, b: Array) -> Array:
-    each = np.stack([a * b, a * b[::-1]])
-    unknown = np.isnan(each)
-    if unknown.any():
-        each[unknown] = 0.0
-    found = np.empty(each.shape[1:])
-    each.min(axis=(0, 1), out=found[0])
-    each.max(axis=(0, 1), out=found[1])
-    return _widen(found)
+    products = np.stack([a * b, a * b[::-1]])
+    is_nan = np.isnan(products)
+    if is_nan.any():
+        products[is_nan] = 0.0
+    product = np.empty(products.shape[1:])
+    products.min(axis=(0, 1), out=product[0])
+    products.max(axis=(0, 1), out=product[1])
+    return _widen(product)
 
 
 def _invert(a: Array) -> Array:
@@ -247,7 +261,7 @@ def _square_root(a: Array) -> Array:
 
 
 def _lift_to_arrays(function: Callable[[Any], Any]) -> Callable[[Array], Array]:
-    """A function of arrays of intervals from a function of balls."""
+    """Make a function of arrays of intervals from a function of balls (midpoint and radius)."""
 
     def apply(a: Array) -> Array:
         ends = [interval(function(ball((low, high)))) for low, high in a.reshape(2, -1).T.tolist()]
@@ -275,12 +289,12 @@ class _Operation:
 
 
 _ONE, _SIGNS = np.ones((2, 1)), np.array([[-1.0], [1.0]])
-_ANYTHING = _SIGNS * np.inf
+_UNBOUNDED = _SIGNS * np.inf
 
 
-def _other_factor(result: Array, other: Array) -> Array:
-    """The other factor of a product; anything if both may be 0."""
-    return np.where(_has_zero(result) & _has_zero(other), _ANYTHING, _divide(result, other))
+def _other_factor(result: Array, factor: Array) -> Array:
+    """Divide a product by a factor; the result is unbounded if both may be 0."""
+    return np.where(_has_zero(result) & _has_zero(factor), _UNBOUNDED, _divide(result, factor))
 
 
 def _undo_absolute(result: Array, a: Array) -> tuple[Array]:
@@ -289,12 +303,12 @@ def _undo_absolute(result: Array, a: Array) -> tuple[Array]:
 
 
 def _unary_operation(
-    name: str, value: Callable[..., Array] | None = None, back: Any = lambda _, a: (_ANYTHING,)
+    name: str, value: Callable[..., Array] | None = None, back: Any = lambda _, a: (_UNBOUNDED,)
 ) -> _Operation:
-    """An operation with one operand; default value and slope come from balls and series of balls."""
-    own = INTERVALS.operations[name]
-    slope = _lift_to_arrays(lambda x: own(flint.arb_series([x, 1], prec=2))[1])
-    return _Operation(value or _lift_to_arrays(own), lambda a, _: (slope(a),), back)
+    """An operation with one operand; its slope, and by default its value, come from ball arithmetic."""
+    function = INTERVALS.operations[name]
+    slope = _lift_to_arrays(lambda x: function(flint.arb_series([x, 1], prec=2))[1])
+    return _Operation(value or _lift_to_arrays(function), lambda a, _: (slope(a),), back)
 
 
 _QUOTIENT = _Operation(
@@ -317,18 +331,18 @@ _OPERATIONS = {
 
 
 def prepare_formula(graph: Formula) -> Formula:
-    """A formula rewritten in the operations of branch and prune.
+    """Rewrite a formula in the operations of branch and prune.
 
     Raises:
-        NotAccepted: for an unsupported operation, with its name.
+        UnsupportedOperation: for an unsupported operation, with its name.
     """
-    known = {name: NODES.operations[name] for name in _OPERATIONS} | {"pow": _expand_power}
-    own = {name: symbol(name) for name in graph.names}
-    return formula(fold(graph, own, Kind(known, NODES.constant)), graph.names)
+    operations = {name: NODES.operations[name] for name in _OPERATIONS} | {"pow": _expand_power}
+    symbols = {name: symbol(name) for name in graph.names}
+    return formula(fold(graph, symbols, Kind(operations, NODES.constant)), graph.names)
 
 
 def _expand_power(a: Node, b: Node) -> Node:
-    """A power by squares and products."""
+    """Write an integer power as squares and products."""
     n = b.fraction
     if n is None or n.denominator > 1:
         raise UnsupportedOperation("pow")
@@ -342,15 +356,15 @@ def _expand_power(a: Node, b: Node) -> Node:
 
 def _evaluate_ranges(graph: Formula, x: Array) -> list[Array]:
     """Ranges of all steps of a formula over boxes, of shape (2, boxes) each."""
-    found: list[Array] = []
+    step_ranges: list[Array] = []
     for op, operands, value in graph.steps:
         if op == INPUT:
-            found.append(x[:, graph.names.index(value)])
+            step_ranges.append(x[:, graph.names.index(value)])
         elif op == CONSTANT:
-            found.append(_enclose_constant(value))
+            step_ranges.append(_enclose_constant(value))
         else:
-            found.append(_OPERATIONS[op].value(*(found[o] for o in operands)))
-    return found
+            step_ranges.append(_OPERATIONS[op].value(*(step_ranges[o] for o in operands)))
+    return step_ranges
 
 
 @lru_cache(maxsize=4096)
@@ -360,49 +374,49 @@ def _enclose_constant(value: Constant) -> Array:
 
 def _evaluate_slopes(graph: Formula, x: Array) -> Array:
     """Ranges of the slopes of the outputs over boxes, of shape (2, outputs, variables, boxes)."""
-    values, nothing = _evaluate_ranges(graph, x), np.zeros((2, *x.shape[1:]))
-    found: list[Array | None] = []
+    values, zero_slopes = _evaluate_ranges(graph, x), np.zeros((2, *x.shape[1:]))
+    step_slopes: list[Array | None] = []
     for k, (op, operands, value) in enumerate(graph.steps):
-        own: Array | None = None
+        slope: Array | None = None
         if op == INPUT:
-            own = nothing.copy()
-            own[:, graph.names.index(value)] = 1.0
-        elif any(found[o] is not None for o in operands):
+            slope = zero_slopes.copy()
+            slope[:, graph.names.index(value)] = 1.0
+        elif any(step_slopes[o] is not None for o in operands):
             parts = _OPERATIONS[op].slopes(*(values[o] for o in operands), values[k])
             for o, part in zip(operands, parts, strict=True):
-                if (inner := found[o]) is not None:
+                if (inner := step_slopes[o]) is not None:
                     outer = inner if part is _ONE else _multiply(inner, part[:, None])
-                    own = outer if own is None else _add(own, outer)
-        found.append(own)
-    return np.stack([nothing if (own := found[o]) is None else own for o in graph.outputs], axis=1)
+                    slope = outer if slope is None else _add(slope, outer)
+        step_slopes.append(slope)
+    return np.stack([zero_slopes if (slope := step_slopes[o]) is None else slope for o in graph.outputs], axis=1)
 
 
-def _contract(graph: Formula, x: Array, most: float) -> tuple[Array, Truth]:
-    """Contract boxes to the points with all outputs between 0 and `most`; also returns which boxes may hold any.
+def _contract(graph: Formula, x: Array, upper_end: float) -> tuple[Array, Truth]:
+    """Contract boxes around points with all outputs between 0 and `upper_end`; also returns which boxes may hold any.
 
     Evaluates the steps forward, then bounds each operand from the result and the other operand (Benhamou et al. 1999).
     """
-    found, narrowed = _evaluate_ranges(graph, x), x.copy()
-    possible = np.ones(x.shape[-1], dtype=bool)
+    step_ranges, narrowed_boxes = _evaluate_ranges(graph, x), x.copy()
+    is_possible = np.ones(x.shape[-1], dtype=bool)
 
-    def narrow_step(k: int, own: Array) -> None:
-        found[k] = _intersect(found[k], own)
-        np.logical_and(possible, found[k][0] <= found[k][1], out=possible)
+    def narrow_step(k: int, allowed_range: Array) -> None:
+        step_ranges[k] = _intersect(step_ranges[k], allowed_range)
+        np.logical_and(is_possible, step_ranges[k][0] <= step_ranges[k][1], out=is_possible)
 
     for o in graph.outputs:
-        narrow_step(o, np.array([[0.0], [most]]))
+        narrow_step(o, np.array([[0.0], [upper_end]]))
     for k, (op, operands, value) in reversed([*enumerate(graph.steps)]):
         if op == INPUT:
-            narrowed[:, graph.names.index(value)] = found[k]
+            narrowed_boxes[:, graph.names.index(value)] = step_ranges[k]
         elif op != CONSTANT:
-            each = _OPERATIONS[op].back(found[k], *(found[o] for o in operands))
-            for o, part in zip(operands, each, strict=True):
-                narrow_step(o, part)
-    return narrowed, possible
+            operand_ranges = _OPERATIONS[op].back(step_ranges[k], *(step_ranges[o] for o in operands))
+            for o, operand_range in zip(operands, operand_ranges, strict=True):
+                narrow_step(o, operand_range)
+    return narrowed_boxes, is_possible
 
 
 def outer_doubles(number: Any) -> tuple[float, float]:
-    """Doubles below and above a number; the same double twice if the number is a double."""
+    """A double at or below a number and one at or above it; the same double twice if the number is a double."""
     exact = flint.arb(number)
     if exact.is_finite() and exact.is_exact() and flint.arb(float(exact)) == exact:
         return float(exact), float(exact)

@@ -1,6 +1,6 @@
 """A question for branch and bound: does any design of the box reach a limit of the objective?
 
-If the abscissa is the objective, the limit is a fixed vertical line, and the question is about the coefficients alone.
+If the abscissa is the objective, the limit is a fixed vertical line, so the question concerns only the coefficients.
 The answer "no" makes the limit a bound for all designs of the box.
 """
 
@@ -23,10 +23,10 @@ from tmsopt.program.formulate import Builder, LiftFunction
 from tmsopt.program.nlp import NLP
 from tmsopt.roots import Root
 
-_NEGLIGIBLE = 1e-6  # roots below this, or above its inverse, count as 0 or infinite
+_NEGLIGIBLE = 1e-6  # roots smaller than this count as 0, roots larger than its inverse as infinite
 
 _WORSE_DIRECTION = {"abscissa": 1.0, "damping_ratio": -1.0}
-"""Direction in which a root quantity gets worse."""
+"""Sign of the change that makes a root quantity worse."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Question:
         cases: cases in which the limits must hold; a bound for fewer cases holds for more.
         limit: value of the objective to reach; None asks for any feasible design.
         unit: typical size of the roots, a power of two.
-        compact: map squared frequencies to a finite range; slower, but no variable grows with them.
+        compact: map squared frequencies to a finite range; this is slower, but no variable becomes huge.
     """
 
     problem: Posed
@@ -47,21 +47,23 @@ class Question:
     compact: bool = False
 
     def possible_signs(self) -> dict[int, dict[int, int]]:
-        """Each sign that a0 can have in the first case → the signs of a0 in the cases that it determines."""
+        """Each possible sign of a0 in the first case → case number → sign of a0 in that case, if it is certain."""
         build = Builder(self.problem, self.cases)
         leading = [compact_coefficients(self.problem.model, values)[0] for values in build.values]
-        can = [(upper > 0, lower < 0) for lower, upper in build.enclose(leading)]
-        first = build.covered_cases[0]
-        known = {k: 1 if positive else -1 for k, (positive, negative) in enumerate(can) if positive != negative}
-        alike = [k for k, a in enumerate(leading) if formula([a]) == formula([leading[first]])]
-        possible = [sign for sign, some in zip((1, -1), can[first], strict=True) if some]
-        return {sign: known | dict.fromkeys(alike, sign) for sign in possible}
+        sign_options = [(upper > 0, lower < 0) for lower, upper in build.enclose(leading)]
+        first_case = build.covered_cases[0]
+        case_signs = {
+            k: 1 if positive else -1 for k, (positive, negative) in enumerate(sign_options) if positive != negative
+        }
+        equal_cases = [k for k, a in enumerate(leading) if formula([a]) == formula([leading[first_case]])]
+        possible = [sign for sign, is_possible in zip((1, -1), sign_options[first_case], strict=True) if is_possible]
+        return {sign: case_signs | dict.fromkeys(equal_cases, sign) for sign in possible}
 
     def leading_program(self, sign: int) -> NLP | None:
-        """NLP for the least leading coefficient under the constraints; None if the box alone keeps it from 0."""
+        """The NLP for the least leading coefficient under the constraints; None if the box keeps it away from 0."""
         build = Builder(self.problem, self.cases)
-        first = build.covered_cases[0]
-        build.objective = sign * compact_coefficients(self.problem.model, build.values[first])[0]
+        first_case = build.covered_cases[0]
+        build.objective = sign * compact_coefficients(self.problem.model, build.values[first_case])[0]
         if build.enclose([build.objective])[0][0] > 0:
             return None
         build.add_constraints(without=self.problem.asked_of_roots)
@@ -73,15 +75,15 @@ class Question:
         if problem.asks(ANGULAR_FREQUENCY):
             raise UnsupportedOperation(ANGULAR_FREQUENCY)
         frame = Frame(problem.model, signs, self.unit, rewards_change_of(problem, "abscissa"), self.compact, least)
-        carried = {"abscissa": partial(add_half_planes, frame), "damping_ratio": partial(add_sectors, frame)}
-        lifts: Mapping[str, LiftFunction] = carried
+        lift_functions = {"abscissa": partial(add_half_planes, frame), "damping_ratio": partial(add_sectors, frame)}
+        lifts: Mapping[str, LiftFunction] = lift_functions
         build = Builder(problem, self.cases, lifts)
-        first = build.covered_cases[0]
-        build.row("a0", frame.coefficients(build.values, first)[0], 0.0, np.inf)
+        first_case = build.covered_cases[0]
+        build.row("a0", frame.coefficients(build.values, first_case)[0], 0.0, np.inf)
         if problem.pattern is not None:
             build.add_pattern(problem.pattern)
             bound_unknowns(frame, build, problem.pattern)
-        for name, lift in carried.items():
+        for name, lift in lift_functions.items():
             value = self._required_value(name)
             if value is not None and name not in build.quantities:
                 build.fix_quantity(name, value)
@@ -95,32 +97,32 @@ class Question:
         return build.finish("bound")
 
     def _required_value(self, name: str) -> float | None:
-        """The value that a root quantity must reach; None if it is unused, or used in any other way."""
-        problem, worse = self.problem, _WORSE_DIRECTION[name]
-        reach: list[float | None] = []
+        """The value that a root quantity must reach; None if the problem has no such requirement on it."""
+        problem, worse_sign = self.problem, _WORSE_DIRECTION[name]
+        thresholds: list[float | None] = []
         if self.limit is not None and problem.objective is not None and name in problem.objective.names:
-            alone = problem.objective.text.strip() == name and not rewards_change_of(problem, name, worse)
-            reach.append(self.limit if alone else None)
-        reach += [_threshold(c, name, worse) for c in problem.conditions.values() if name in c.names]
-        found = [value for value in reach if value is not None]
-        if not reach or len(found) < len(reach):
+            is_alone = problem.objective.text.strip() == name and not rewards_change_of(problem, name, worse_sign)
+            thresholds.append(self.limit if is_alone else None)
+        thresholds += [_threshold(c, name, worse_sign) for c in problem.conditions.values() if name in c.names]
+        values = [value for value in thresholds if value is not None]
+        if not thresholds or len(values) < len(thresholds):
             return None
-        return min(found) if worse > 0 else max(found)
+        return min(values) if worse_sign > 0 else max(values)
 
 
-def _threshold(condition: Expression, name: str, worse: float) -> float | None:
+def _threshold(condition: Expression, name: str, worse_sign: float) -> float | None:
     """The worst value of a quantity that a comparison allows; None unless it is linear in that quantity alone."""
     if condition.names != (name,) or condition.equality:
         return None
     if not is_linear(formula([condition({name: symbol(name)})], [name])):  # |ζ| ≥ 1/2 looks linear from 0 to 1
         return None
-    at = [float(condition({name: value})) for value in (0.0, 1.0)]
-    slope = at[1] - at[0]
-    return -at[0] / slope if slope * condition.sign * worse > 0 else None
+    differences = [float(condition({name: value})) for value in (0.0, 1.0)]
+    slope = differences[1] - differences[0]
+    return -differences[0] / slope if slope * condition.sign * worse_sign > 0 else None
 
 
 def typical_size(roots: Iterable[Root]) -> float:
     """Geometric mean of the sizes of the roots, rounded to a power of two."""
     sizes = [r.size for r in roots for _ in range(r.multiplicity)]
-    known = [math.log2(size) for size in sizes if _NEGLIGIBLE < size < 1 / _NEGLIGIBLE]
-    return float(2.0 ** round(sum(known) / len(known))) if known else 1.0
+    exponents = [math.log2(size) for size in sizes if _NEGLIGIBLE < size < 1 / _NEGLIGIBLE]
+    return float(2.0 ** round(sum(exponents) / len(exponents))) if exponents else 1.0

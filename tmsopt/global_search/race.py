@@ -1,7 +1,7 @@
 """Runs a global solver on several tasks in parallel; the first infeasible one stops the others.
 
-SCIP can crash, and does if two threads of one process run it. In a separate process a crash costs nothing else, the
-solver can be stopped at any moment, and its output is not shown.
+SCIP can crash, and it does crash if two threads of one process run it. In a separate process a crash ends nothing else,
+the solver can be stopped at any moment, and its output is hidden.
 """
 
 import time
@@ -13,7 +13,7 @@ from tmsopt.global_search.tasks import INFEASIBLE, UNDECIDED, Decision, GlobalSo
 from tmsopt.killable import Killable, ProcessEnded
 
 _TICK = 0.02  # seconds between polls
-_GRACE = 5.0  # seconds a solver may overrun its limit, as SCIP does while it solves a relaxation
+_GRACE = 5.0  # seconds by which a solver may overrun its limit; SCIP does while it solves a relaxation
 
 
 class SolverPool:
@@ -42,9 +42,9 @@ class SolverPool:
             tick: called at every poll.
 
         Raises:
-            NotAccepted: if the solver supports none of the tasks.
+            UnsupportedOperation: if the solver supports none of the tasks.
             SolverFailed: if the solver raised an error and decided nothing.
-            KeyboardInterrupt: if the user stops it; no process is left behind.
+            KeyboardInterrupt: if the user presses Ctrl-C; no process is left behind.
         """
         self.start_processes(len(tasks))
         began = time.monotonic()
@@ -54,15 +54,15 @@ class SolverPool:
                 process = self._idle.pop()
                 running.append((process, process.call(self._solver.decide, task)))
             answers = [answer for _, answer in running]
-            while waiting := [answer for answer in answers if not answer.done()]:
+            while open_answers := [answer for answer in answers if not answer.done()]:
                 tick()
-                finished, _ = wait(waiting, _TICK, FIRST_COMPLETED)
-                decided = (answer for answer in answers if answer.done() and not answer.exception())
-                if not finished and any(answer.result().verdict == INFEASIBLE for answer in decided):
-                    break  # after one more poll, since ending a process that is nearly done costs a new one
-                late = time.monotonic() - began - _GRACE
+                finished_answers, _ = wait(open_answers, _TICK, FIRST_COMPLETED)
+                decided_answers = (answer for answer in answers if answer.done() and not answer.exception())
+                if not finished_answers and any(answer.result().verdict == INFEASIBLE for answer in decided_answers):
+                    break  # after one more poll: a process that is nearly done can be kept, one that is ended cannot
+                time_allowed = time.monotonic() - began - _GRACE
                 for task, (process, answer) in zip(tasks, running, strict=True):
-                    if task.seconds < late and not answer.done():
+                    if task.seconds < time_allowed and not answer.done():
                         process.end()
         finally:
             for process, answer in running:
@@ -75,7 +75,7 @@ class SolverPool:
 
 def _collect_decisions(answers: Sequence["Future[Decision]"]) -> list[Decision]:
     """Decisions in the order of the tasks; undecided if the process was ended or crashed."""
-    decisions, refused, failed = list[Decision](), list[UnsupportedOperation](), list[BaseException]()
+    decisions, unsupported, failures = list[Decision](), list[UnsupportedOperation](), list[BaseException]()
     for answer in answers:
         match answer.exception() if answer.done() else ProcessEnded():
             case None:
@@ -83,11 +83,11 @@ def _collect_decisions(answers: Sequence["Future[Decision]"]) -> list[Decision]:
             case ProcessEnded():
                 decisions.append(Decision(UNDECIDED))
             case UnsupportedOperation() as error:
-                refused.append(error)
+                unsupported.append(error)
             case error:
-                failed.append(error)
-    if failed and all(decision.verdict == UNDECIDED for decision in decisions):
-        raise SolverFailed(f"{type(failed[0]).__name__}: {' '.join(str(failed[0]).split())}") from failed[0]
-    if refused and not decisions:
-        raise refused[0]
+                failures.append(error)
+    if failures and all(decision.verdict == UNDECIDED for decision in decisions):
+        raise SolverFailed(f"{type(failures[0]).__name__}: {' '.join(str(failures[0]).split())}") from failures[0]
+    if unsupported and not decisions:
+        raise unsupported[0]
     return decisions

@@ -9,7 +9,7 @@ from tmsopt.global_search.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, G
 from tmsopt.global_search.translation import FEASIBILITY, Translation
 
 _MIN_SECONDS = 0.01
-_MARGIN = 1e-6  # relative: how far the tolerances may move a bound
+_MARGIN = 1e-6  # relative to a bound: how far the tolerances may move it
 
 
 def prepare() -> None:
@@ -21,7 +21,7 @@ def decide(task: Task) -> Decision:
     """Decide a task.
 
     Raises:
-        NotAccepted: for an operation that SCIP does not support.
+        UnsupportedOperation: for an operation that SCIP does not support.
     """
     began = time.perf_counter()
     translation = Translation(task.nlp)
@@ -38,11 +38,11 @@ def decide(task: Task) -> Decision:
     model.setParam("limits/time", max(task.seconds - (time.perf_counter() - began), _MIN_SECONDS))
     model.setParam("numerics/feastol", FEASIBILITY)
     model.optimizeNogil()  # lets other threads notice that the parent process has ended
-    status, found = model.getStatus(), model.getNSols() > 0
-    point = np.array([model.getVal(x.symbol) * x.scale for x in translation.x]) if found else None
+    status, has_point = model.getStatus(), model.getNSols() > 0
+    point = np.array([model.getVal(x.symbol) * x.scale for x in translation.x]) if has_point else None
     bound = float(model.getDualbound())
     return Decision(
-        verdict=INFEASIBLE if status == "infeasible" else FOUND if found else UNDECIDED,
+        verdict=INFEASIBLE if status == "infeasible" else FOUND if has_point else UNDECIDED,
         point=point,
         bound=math.inf if status == "infeasible" else bound - FEASIBILITY - _MARGIN * abs(bound),
         nodes=int(model.getNTotalNodes()),

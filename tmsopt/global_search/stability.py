@@ -19,8 +19,8 @@ from tmsopt.progress import Counts
 SOLVER = SCIP
 """The global solver in use, here and in `certify`."""
 
-_MARGIN = 1e-3  # of the typical size of the roots: the second question asks for this much decay
-_SHARE = 0.7  # of the time, for the proof
+_MARGIN = 1e-3  # relative to the typical size of the roots: decay that the second question requires
+_SHARE = 0.7  # share of the time for the proof
 _ACCEPT_ANY = partial(Answer, FOUND, None)
 
 
@@ -29,7 +29,7 @@ class Stability:
     """Whether any design is stable.
 
     Attributes:
-        any: True if `design` is stable by a recheck, False if it is proved that no design is, None if unknown.
+        any: True if a recheck confirms that `design` is stable, False if no design is (proved), None if unknown.
         design: free parameters of a stable design; it may violate a limit by the solver's tolerance.
         proof: the kind of proof, in words.
         failed: the error of the solver, if it failed.
@@ -44,7 +44,7 @@ class Stability:
 def find_stable_design(
     problem: Posed,
     seconds: float,
-    known: Mapping[str, float] | None = None,
+    known_design: Mapping[str, float] | None = None,
     progress: Counts | None = None,
 ) -> Stability:
     """Decide whether any design of the box has all roots left of the axis in every case listed.
@@ -54,39 +54,42 @@ def find_stable_design(
     tolerance.
 
     Args:
-        seconds: time limit, without the start of processes; unused without a global solver.
-        known: parameters of the best known design; a question that excludes it proves nothing.
+        seconds: time limit of the solver, without the start of its processes.
+        known_design: parameters of the best known design; a question that excludes it proves nothing.
         progress: called with the seconds used and the seconds granted.
 
     Raises:
-        KeyboardInterrupt: if the user stops it.
+        KeyboardInterrupt: if the user presses Ctrl-C.
     """
     if has_no_stable_design(problem):
         return Stability(False, proof="by signs of coefficients, in interval arithmetic")
     if not SOLVER.available or not problem.free:
         return Stability()
     constraints = {n: text for n, text in problem.constraints.items() if n not in problem.asked_of_roots}
-    relaxed = problem.derive(minimize="abscissa", maximize=None, pareto=(), constraints=constraints)
-    best = _recheck_point(relaxed, {n: known[n] for n in problem.free} if known else default_start(problem))
+    relaxation = problem.derive(minimize="abscissa", maximize=None, pareto=(), constraints=constraints)
+    best = _recheck_point(
+        relaxation, {n: known_design[n] for n in problem.free} if known_design else default_start(problem)
+    )
     unit = typical_size(best.structure.roots)
-    at_axis = Question(relaxed, relaxed.cases, 0.0, unit)
+    axis_question = Question(relaxation, relaxation.cases, 0.0, unit)
     with SolverPool(SOLVER) as pool:
         clock = Clock(seconds, pool, progress)
         try:
-            reply = answer_question(at_axis, clock, _SHARE, _ACCEPT_ANY)
-            proved = reply.verdict == INFEASIBLE
-            if proved and known is not None and not best.violations:
-                proved = _is_admitted(at_axis, best, known, clock)
-            if reply.verdict == FOUND and _judge_point(relaxed, reply.other).design is None:  # on the axis
-                reply = answer_question(replace(at_axis, limit=-_MARGIN * unit), clock, 1.0, _ACCEPT_ANY)
+            reply = answer_question(axis_question, clock, _SHARE, _ACCEPT_ANY)
+            is_proved = reply.verdict == INFEASIBLE
+            if is_proved and known_design is not None and not best.violations:
+                is_proved = _is_admitted(axis_question, best, known_design, clock)
+            # A point with roots on the axis does not decide the question.
+            if reply.verdict == FOUND and _judge_point(relaxation, reply.point).design is None:
+                reply = answer_question(replace(axis_question, limit=-_MARGIN * unit), clock, 1.0, _ACCEPT_ANY)
         except UnsupportedOperation:
             return Stability()
         except SolverFailed as error:
             return Stability(failed=f"{SOLVER.name} failed: {error}")
     if clock.interrupted:
         raise KeyboardInterrupt
-    by = f"in floating-point arithmetic, by {SOLVER.name}, feasibility tolerance {SOLVER.tolerance:.0e}"
-    return Stability(False, proof=by) if proved else _judge_point(relaxed, reply.other)
+    method_text = f"in floating-point arithmetic, by {SOLVER.name}, feasibility tolerance {SOLVER.tolerance:.0e}"
+    return Stability(False, proof=method_text) if is_proved else _judge_point(relaxation, reply.point)
 
 
 def _recheck_point(problem: Posed, design: Mapping[str, float]) -> Evaluation:
@@ -95,13 +98,15 @@ def _recheck_point(problem: Posed, design: Mapping[str, float]) -> Evaluation:
 
 def _judge_point(problem: Posed, design: Mapping[str, float] | None) -> Stability:
     """The verdict on a point that the solver found."""
-    if design is None or not max((checked := _recheck_point(problem, design)).structure.abscissa, checked.realised) < 0:
-        return Stability()
-    return Stability(None if checked.violations else True, design)
+    if design is not None:
+        evaluation = _recheck_point(problem, design)
+        if max(evaluation.structure.abscissa, evaluation.realised) < 0:
+            return Stability(None if evaluation.violations else True, design)
+    return Stability()
 
 
-def _is_admitted(question: Question, best: Evaluation, known: Mapping[str, float], clock: Clock) -> bool:
+def _is_admitted(question: Question, best: Evaluation, known_design: Mapping[str, float], clock: Clock) -> bool:
     """Whether the question and the solver admit a known design, for a line just right of its roots."""
-    design = {n: known[n] for n in question.problem.free}
-    wider = replace(question, limit=best.structure.abscissa + _MARGIN * question.unit)
-    return not find_exclusion(wider, design) and not is_excluded_by_solver(wider, design, clock)
+    design = {n: known_design[n] for n in question.problem.free}
+    wider_question = replace(question, limit=best.structure.abscissa + _MARGIN * question.unit)
+    return not find_exclusion(wider_question, design) and not is_excluded_by_solver(wider_question, design, clock)

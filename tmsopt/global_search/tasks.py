@@ -1,4 +1,4 @@
-"""Interface of a global solver: its tasks, its decisions, its name.
+"""The interface of a global solver: its tasks, its decisions and its name.
 
 `scip` implements it; `stability.SOLVER` selects the solver in use.
 """
@@ -17,7 +17,7 @@ INFEASIBLE, FOUND, UNDECIDED = "infeasible", "found", "undecided"
 
 
 class SolverFailed(RuntimeError):
-    """An error raised by a global solver or its installation, in one line; no decision."""
+    """A global solver or its installation raised an error (the message, in one line) and decided nothing."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Decision:
         verdict: ``infeasible``, ``found``, or ``undecided`` if time ran out.
         point: a feasible point of the NLP, if one was found.
         bound: lower bound on the objective, if the task minimises.
-        nodes: of the search tree.
+        nodes: number of nodes of the search tree.
     """
 
     verdict: str
@@ -42,7 +42,7 @@ class Task:
     """A task for a global solver.
 
     Attributes:
-        nlp: only its functions and the ranges of its variables and rows are set.
+        nlp: only its functions, and the ranges of its variables and rows, are used.
         minimise: find the least objective; otherwise any feasible point.
         box: narrower ranges for the first variables.
     """
@@ -63,7 +63,7 @@ class GlobalSolver:
         missing: the message if that module is not installed.
         tolerance: feasibility tolerance of a row; 0 for exact arithmetic.
         prepare: called once in the process, before the first task.
-        decide: decides a task; raises NotAccepted for an unsupported operation.
+        decide: decides a task; raises UnsupportedOperation for an unsupported operation.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """An NLP as factorable polynomial equations for SCIP.
 
-Every product of two expressions that are not affine gets a variable, and so does every expression that is used twice:
-what the formula shares, the relaxation shares. Quotients, radicals and arctangents become equations without them.
+A quadratic expression gets a variable when it is multiplied again. It gets the variable only once, so that the
+relaxation shares it as the formula does. Quotients, radicals and arctangents become equations without them.
 """
 
 import math
@@ -20,8 +20,8 @@ from tmsopt.program.nlp import NLP
 FEASIBILITY = 1e-9
 """SCIP's feasibility tolerance of a row."""
 
-_MIN_POWER = -60  # least scale, as a power of two; smaller numbers count as 0
-_HUGE = 1e15  # largest number accepted; SCIP takes 1e20 for infinite
+_MIN_POWER = -60  # least scale, as a power of two; numbers that are smaller count as 0
+_HUGE = 1e15  # largest number accepted; SCIP treats 1e20 as infinite
 _LARGE = 1e3  # largest number that a coefficient below 1e-9 may multiply, since SCIP drops such a coefficient
 _MAX_EXPONENT = 1000
 
@@ -33,15 +33,15 @@ _CANCELLATION = 2.0**-10
 
 @dataclass(frozen=True)
 class Term:
-    """An intermediate result: a SCIP expression with its degree and range.
+    """An intermediate result: a SCIP expression with its degree and its range.
 
     Attributes:
         expression: a number if the degree is 0.
         degree: 0, 1 or 2.
-        ball: its range.
-        size: bound on its summands, which may cancel.
+        ball: its range, as a midpoint and a radius.
+        size: bound on its summands, which may cancel each other.
         tangent: the operand, if the term is an arctangent.
-        symbol, scale: of a variable, whose expression is scale · symbol.
+        symbol, scale: for a variable, whose expression is scale · symbol.
     """
 
     expression: Any
@@ -58,7 +58,7 @@ class Term:
 
     @property
     def unit(self) -> float:
-        """The power of two, at most 1, by which a row of this term is divided to be about 1."""
+        """The power of two, at most 1, that scales a row of this term to about 1 if the row is divided by it."""
         return max(_scale_of(max(map(abs, self.ends))), min(_CANCELLATION * _scale_of(self.size), 1.0))
 
 
@@ -76,7 +76,7 @@ class Translation:
         """Translate an NLP.
 
         Raises:
-            NotAccepted: for an operation that SCIP does not support.
+            UnsupportedOperation: for an operation that SCIP does not support.
         """
         import pyscipopt
 
@@ -92,30 +92,30 @@ class Translation:
             self.add_row(row, lower, upper)
         self.objective = self.as_affine(objective).expression
 
-    def add_variable(self, lower: float, upper: float, over: Any = None) -> Term:
+    def add_variable(self, lower: float, upper: float, enclosure: Any = None) -> Term:
         """Add a variable, scaled by a power of two to about 1."""
         scale = _scale_of(max(abs(lower), abs(upper)))
         ends = [e / scale if math.isfinite(e) else None for e in (lower, upper)]
         self.count += 1
         symbol = self.model.addVar(f"v{self.count}", lb=ends[0], ub=ends[1])
-        over = ball((lower, upper)) if over is None else over
-        return Term(scale * symbol, 1, over, max(abs(lower), abs(upper)), symbol=symbol, scale=scale)
+        enclosure = ball((lower, upper)) if enclosure is None else enclosure
+        return Term(scale * symbol, 1, enclosure, max(abs(lower), abs(upper)), symbol=symbol, scale=scale)
 
-    def add_bounded_variable(self, over: Any, lower: float = -math.inf) -> Term:
+    def add_bounded_variable(self, enclosure: Any, lower: float = -math.inf) -> Term:
         """Add a variable with a range."""
-        ends = interval(over)
-        return self.add_variable(max(ends[0], lower), ends[1], over)
+        ends = interval(enclosure)
+        return self.add_variable(max(ends[0], lower), ends[1], enclosure)
 
     def as_affine(self, term: Term) -> Term:
         """A term of degree 1 at most; a quadratic term gets a variable, once."""
-        found: Term = term if term.degree < 2 else self.remember("variable", term, self.add_equal_variable)
-        return found
+        affine_term: Term = term if term.degree < 2 else self.remember("variable", term, self.add_equal_variable)
+        return affine_term
 
     def add_equal_variable(self, term: Term) -> Term:
         """Add a variable equal to a term."""
-        new = self.add_bounded_variable(term.ball)
-        self.add_row(Term(new.expression - term.expression, 2, term.ball, term.size), 0.0, 0.0)
-        return new
+        variable = self.add_bounded_variable(term.ball)
+        self.add_row(Term(variable.expression - term.expression, 2, term.ball, term.size), 0.0, 0.0)
+        return variable
 
     def remember(self, name: str, term: Term, make: Callable[[Term], Any]) -> Any:
         """The result of `make` for a term, made once; the cache keeps the term, so its id stays unique."""
@@ -167,8 +167,8 @@ class Translation:
         )
 
     def add(self, a: Term, b: Term, sign: float) -> Term:
-        over = a.ball + sign * b.ball
-        return Term(a.expression + sign * b.expression, max(a.degree, b.degree), over, max(a.size, b.size))
+        enclosure = a.ball + sign * b.ball
+        return Term(a.expression + sign * b.expression, max(a.degree, b.degree), enclosure, max(a.size, b.size))
 
     def scale_by(self, a: Term, factor: float) -> Term:
         if 0 < abs(factor) < FEASIBILITY:
@@ -176,9 +176,9 @@ class Translation:
         return Term(factor * a.expression, a.degree, factor * a.ball, abs(factor) * a.size)
 
     def multiply(self, a: Term, b: Term) -> Term:
-        for fixed, other in ((a, b), (b, a)):
-            if fixed.degree == 0:
-                return self.scale_by(other, fixed.expression)
+        for constant_factor, factor in ((a, b), (b, a)):
+            if constant_factor.degree == 0:
+                return self.scale_by(factor, constant_factor.expression)
         a, b = self.as_affine(a), self.as_affine(b)
         return Term(a.expression * b.expression, 2, a.ball * b.ball, a.size * b.size)
 
@@ -195,10 +195,10 @@ class Translation:
         return q
 
     def divide_by_nonzero(self, a: Term, b: Term) -> Term:
-        """q with q b = a, which leaves 0/0 free.
+        """q with q b = a; for 0/0 any q.
 
         Raises:
-            NotAccepted: for the constant b = 0.
+            UnsupportedOperation: for the constant b = 0.
         """
         if b.degree == 0 and not b.expression:
             raise UnsupportedOperation("a ratio to 0")
@@ -211,8 +211,8 @@ class Translation:
 
     def take_root(self, a: Term) -> Term:
         """r ≥ 0 with r² = a."""
-        least, most = self.nonnegative_ends(a)
-        r = self.add_variable(math.nextafter(math.sqrt(least), 0), math.nextafter(math.sqrt(most), math.inf))
+        lower, upper = self.nonnegative_ends(a)
+        r = self.add_variable(math.nextafter(math.sqrt(lower), 0), math.nextafter(math.sqrt(upper), math.inf))
         self.add_row(Term(r.expression * r.expression - a.expression, 2, a.ball, a.size), 0.0, 0.0)
         return r
 
@@ -234,16 +234,16 @@ class Translation:
             return self.raise_to_fraction(a, exponent)
         if exponent == 0:
             return _constant(1.0)
-        half = self.raise_to_power(a, _constant(exponent // 2)) if exponent > 1 else _constant(1.0)
-        even = self.square(half) if exponent > 1 else half
-        return self.multiply(even, a) if exponent % 2 else even
+        half_power = self.raise_to_power(a, _constant(exponent // 2)) if exponent > 1 else _constant(1.0)
+        even_power = self.square(half_power) if exponent > 1 else half_power
+        return self.multiply(even_power, a) if exponent % 2 else even_power
 
     def raise_to_fraction(self, a: Term, exponent: float) -> Term:
         """A positive power of a ≥ 0."""
-        least, most = self.nonnegative_ends(a)
+        lower, upper = self.nonnegative_ends(a)
         a = self.as_affine(a)
         power = flint.arb(exponent)
-        low, high = (flint.arb(e) ** power if math.isfinite(e) else flint.arb("inf") for e in (least, most))
+        low, high = (flint.arb(e) ** power if math.isfinite(e) else flint.arb("inf") for e in (lower, upper))
         v = self.add_variable(max(interval(low)[0], 0.0), interval(high)[1])
         self.add_equation(v.expression, a.expression**exponent, v.scale)
         return v
@@ -290,8 +290,8 @@ class Translation:
     def add_inverse(self, a: Term, name: str, inverse: str) -> Term:
         """Add an angle with a given sine or cosine."""
         ends = (-math.pi / 2, math.pi / 2) if name == "sin" else (0.0, math.pi)
-        over = _RANGES[inverse](a.ball)
-        angle = self.add_bounded_variable(over) if over.is_finite() else self.add_variable(*ends)
+        enclosure = _RANGES[inverse](a.ball)
+        angle = self.add_bounded_variable(enclosure) if enclosure.is_finite() else self.add_variable(*ends)
         self.add_equation(self.as_affine(a).expression, getattr(self.functions, name)(angle.expression))
         return angle
 
@@ -311,7 +311,7 @@ class Translation:
         return self.add(middle, self.scale_by(self.absolute(self.add(a, b, -1.0)), half), 1.0)
 
     def mark_impossible(self) -> Term:
-        """Mark the NLP as infeasible, since a value exists for no design."""
+        """Mark the NLP as infeasible, since no design has a value."""
         self.impossible = True
         return _constant(0.0)
 
@@ -322,9 +322,9 @@ def _constant(value: float) -> Term:
     return Term(float(value), 0, flint.arb(value), abs(float(value)))
 
 
-def _refuse_huge(over: Any, name: str, most: float = _HUGE) -> None:
-    if over.is_finite() and max(map(abs, interval(over))) > most:
-        raise UnsupportedOperation(f"{name} of numbers beyond {most:g}")
+def _refuse_huge(enclosure: Any, name: str, limit: float = _HUGE) -> None:
+    if enclosure.is_finite() and max(map(abs, interval(enclosure))) > limit:
+        raise UnsupportedOperation(f"{name} of numbers beyond {limit:g}")
 
 
 def _scale_of(size: float) -> float:

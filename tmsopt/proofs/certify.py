@@ -28,11 +28,11 @@ SECONDS = 60.0
 PROVEN = 1e-4
 """Gap, relative to the objective or to 0.1, up to which a bound counts as a proof of global optimality."""
 
-_FINE_LEVEL = 1e-6  # tried after PROVEN; a smaller gap would be within SCIP's tolerance
-_COARSE_LEVELS = (1e-2, 1e-1, 1.0, 10.0)  # tried if PROVEN fails
-_FIRST_LEVELS = (1.0, 0.1, 1e-2, 1e-3, PROVEN)  # tried first for a design that did not converge
-_MIN_RATIO = 1.5  # of the gap proved to the gap not proved: narrowing further is not worth the time
-_SHARE = 0.6  # of the time left, for a gap that is not the last to be tried
+_FINE_LEVEL = 1e-6  # gap tried after PROVEN; a smaller gap would be within SCIP's tolerance
+_COARSE_LEVELS = (1e-2, 1e-1, 1.0, 10.0)  # gaps tried if PROVEN fails
+_FIRST_LEVELS = (1.0, 0.1, 1e-2, 1e-3, PROVEN)  # gaps tried first for a design that did not converge
+_MIN_RATIO = 1.5  # of the least gap proved to the largest gap not proved; below it, narrowing is not worth the time
+_SHARE = 0.6  # share of the time left for a gap, unless it is the last one to try
 
 
 def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | None = None) -> Solution:
@@ -60,29 +60,32 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | Non
     check_installed()
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 < seconds < math.inf:
         raise InputError([Fault(f"found {seconds!r}; accepted: a positive number of seconds", ("seconds",))])
-    found = solve_if_needed(design, progress)
-    problem = as_solvable(found)
+    solution = solve_if_needed(design, progress)
+    problem = as_solvable(solution)
     if not problem.free:
-        return _add_note(found, "nothing is free, so there is nothing to bound")
-    if problem.objective is None and is_feasible(found):
-        return _add_note(found, "nothing is minimised or maximised, so there is nothing to bound")
+        return _add_note(solution, "nothing is free, so there is nothing to bound")
+    if problem.objective is None and is_feasible(solution):
+        return _add_note(solution, "nothing is minimised or maximised, so there is nothing to bound")
     if problem.asks_radius:
-        return _add_note(found, f"no bound: branch and bound does not support {RADIUS}")
+        return _add_note(solution, f"no bound: branch and bound does not support {RADIUS}")
     with SolverPool(SOLVER) as pool:
         steps = steps_for(progress)
         clock = Clock(seconds, pool, steps)
         try:
             begin(steps, "bounding the optimum", "s")
-            replaced = True
-            while replaced and not (problem.objective is None and is_feasible(found)):
-                found, replaced = (_bound_feasible if is_feasible(found) else _prove_infeasible)(found, clock)
+            has_better = True
+            while has_better and not (problem.objective is None and is_feasible(solution)):
+                take_step = _bound_feasible if is_feasible(solution) else _prove_infeasible
+                solution, has_better = take_step(solution, clock)
         except UnsupportedOperation as error:
-            return _note_failure(found, f"no bound: branch and bound does not support {error}")
+            return _note_failure(solution, f"no bound: branch and bound does not support {error}")
         except SolverFailed as error:
-            return _note_failure(found, f"{SOLVER.name} failed: {error}; there is no bound")
+            return _note_failure(solution, f"{SOLVER.name} failed: {error}; there is no bound")
         except KeyboardInterrupt:
             clock.interrupted = True
-        return replace(_add_note(found, "the proof was interrupted"), interrupted=True) if clock.interrupted else found
+        if clock.interrupted:
+            solution = replace(_add_note(solution, "the proof was interrupted"), interrupted=True)
+        return solution
 
 
 def check_installed() -> None:
@@ -97,52 +100,52 @@ def check_installed() -> None:
 
 def _bound_feasible(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     """Prove the smallest gap of a feasible design; returns it, or a better design and True."""
-    known = _instant_bound(design)
-    if known.proven:
-        return replace(design, bound=known), False
-    check, point = _pose_question(design, -PROVEN), {name: design.parameters[name] for name in design.problem.free}
-    if reason := find_exclusion(check, point):
+    known_bound = _instant_bound(design)
+    if known_bound.proven:
+        return replace(design, bound=known_bound), False
+    question, point = _pose_question(design, -PROVEN), {name: design.parameters[name] for name in design.problem.free}
+    if reason := find_exclusion(question, point):
         return _note_failure(design, f"no bound: {reason}"), False
-    if is_excluded_by_solver(check, point, clock):
+    if is_excluded_by_solver(question, point, clock):
         return _note_failure(design, f"no bound: {SOLVER.name}'s relaxation excludes the known design"), False
-    proved, failed = math.inf, 0.0
-    converged = design.status == "optimal"
-    while (level := _next_level(proved, failed, converged)) is not None and clock.seconds_left > 0:
+    proved_level, failed_level = math.inf, 0.0
+    has_converged = design.status == "optimal"
+    while (level := _next_level(proved_level, failed_level, has_converged)) is not None and clock.seconds_left > 0:
         share = 1.0 if level in (_FINE_LEVEL, _COARSE_LEVELS[-1]) else _SHARE
-        clock.note = _progress_note(design, min(known.gap, _gap(design.value, proved)), level)
-        reply = answer_question(
-            _pose_question(design, level), clock, share, partial(confirm_point, design, _cases(design))
-        )
+        clock.note = _progress_note(design, min(known_bound.gap, _gap(design.value, proved_level)), level)
+        confirm = partial(confirm_point, design, _cases(design))
+        reply = answer_question(_pose_question(design, level), clock, share, confirm)
         if reply.better is not None:
             return reply.better, True
         if reply.verdict == INFEASIBLE:
-            proved = level
+            proved_level = level
         else:
-            failed = level
-    return replace(design, bound=_stronger_bound(design, known, _proved_bound(design, proved, clock))), False
+            failed_level = level
+    bound = _stronger_bound(design, known_bound, _proved_bound(design, proved_level, clock))
+    return replace(design, bound=bound), False
 
 
 def _progress_note(design: Solution, gap: float, level: float) -> str:
-    """The state of the proof for progress: the gap proved, the best value and the gap tried next."""
+    """The progress note: the gap proved, the best value and the gap tried next."""
     bound = design.value - design.problem.posed.sign * gap
-    known = f"gap {gap:.2g}, bound {bound:.6g}" if math.isfinite(gap) else "no bound"
-    return f"{known}, best {design.value:.6g}; trying gap {_gap(design.value, level):.2g}"
+    bound_text = f"gap {gap:.2g}, bound {bound:.6g}" if math.isfinite(gap) else "no bound"
+    return f"{bound_text}, best {design.value:.6g}; trying gap {_gap(design.value, level):.2g}"
 
 
-def _next_level(proved: float, failed: float, converged: bool) -> float | None:
-    """The next level to try, from the least one proved and the last one that failed; None to stop.
+def _next_level(proved_level: float, failed_level: float, has_converged: bool) -> float | None:
+    """Choose the next level (relative gap) from the least level proved and the last one that failed; None to stop.
 
-    A design that did not converge starts with large gaps, since each step only leads to another design.
+    A design that did not converge starts with large gaps, since each step is likely to lead to a better design.
     """
-    if not converged and failed == 0:
-        return next((level for level in _FIRST_LEVELS if level < proved), None)
-    if proved == math.inf:
-        return next((level for level in (PROVEN, *_COARSE_LEVELS) if level > failed), None)
-    if failed == 0:
-        return _FINE_LEVEL if proved > _FINE_LEVEL else None
-    if proved <= PROVEN or proved < _MIN_RATIO * failed:
+    if not has_converged and failed_level == 0:
+        return next((level for level in _FIRST_LEVELS if level < proved_level), None)
+    if proved_level == math.inf:
+        return next((level for level in (PROVEN, *_COARSE_LEVELS) if level > failed_level), None)
+    if failed_level == 0:
+        return _FINE_LEVEL if proved_level > _FINE_LEVEL else None
+    if proved_level <= PROVEN or proved_level < _MIN_RATIO * failed_level:
         return None
-    return max(PROVEN, math.sqrt(proved * failed))
+    return max(PROVEN, math.sqrt(proved_level * failed_level))
 
 
 def _prove_infeasible(design: Solution, clock: Clock) -> tuple[Solution, bool]:
@@ -150,30 +153,31 @@ def _prove_infeasible(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     if design.bound.proven:
         return design, False
     clock.note = "looking for a feasible design"
-    reply = answer_question(_pose_question(design, None), clock, 1.0, partial(confirm_point, design, _cases(design)))
+    problem, cases = design.problem.posed, _cases(design)
+    reply = answer_question(_pose_question(design, None), clock, 1.0, partial(confirm_point, design, cases))
     if reply.better is not None:
         return reply.better, True
     if reply.verdict == INFEASIBLE:
-        if not recheck(design.problem.posed, design.parameters, _cases(design)).violations:
-            return _note_failure(
-                design, f"no proof: {SOLVER.name}'s relaxation excludes a known feasible design"
-            ), False
-        bound = _search_bound(design.problem.posed.sign * math.inf, 0.0, True, clock)
+        if not recheck(problem, design.parameters, cases).violations:
+            reason = f"no proof: {SOLVER.name}'s relaxation excludes a known feasible design"
+            return _note_failure(design, reason), False
+        bound = _search_bound(problem.sign * math.inf, 0.0, True, clock)
         return replace(design, status="infeasible", bound=bound), False
     note = "branch and bound did not decide in time whether any design is feasible"
     return _add_note(replace(design, bound=_proved_bound(design, math.inf, clock)), note), False
 
 
 def _instant_bound(design: Solution) -> Bound:
-    """The bound without a search, computed again; a damping ratio is at most 1, a frequency at least 0."""
-    if design.problem.posed.sense == "maximize" and (design.problem.maximize or "").strip() == "damping_ratio":
-        gap = max(1.0 - design.value, 0.0)
+    """Compute the bound without a search again; a damping ratio is at most 1, a frequency at least 0."""
+    problem, value = design.problem.posed, design.value
+    if problem.sign < 0 and problem.goal == "damping_ratio":
+        gap = max(1.0 - value, 0.0)
         return Bound(1.0, gap, gap == 0, "definition")
-    objective, text = design.problem.posed.objective, (design.problem.minimize or "").strip()
+    is_frequency = problem.sign > 0 and problem.goal in (ANGULAR_FREQUENCY, "frequency")
     # A model may have a parameter called frequency.
-    if text in (ANGULAR_FREQUENCY, "frequency") and objective and ANGULAR_FREQUENCY in objective.names:
-        return Bound(0.0, design.value, design.value == 0, "definition")
-    bound = instant_bound(design.problem.posed, design.value)
+    if is_frequency and problem.objective and ANGULAR_FREQUENCY in problem.objective.names:
+        return Bound(0.0, value, value == 0, "definition")
+    bound = instant_bound(problem, value)
     return bound if math.isfinite(bound.value) else _interval_bound(design)
 
 
@@ -185,15 +189,17 @@ def _interval_bound(design: Solution) -> Bound:
     build = Builder(problem, _cases(design))
     build.add_objective()
     lower, upper = build.enclose([build.objective])[0]  # of the negative objective if it is maximised
-    sense = problem.sign
-    gap = max(sense * design.value - lower, 0.0)
-    return Bound(sense * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()
+    gap = max(problem.sign * design.value - lower, 0.0)
+    return (
+        Bound(problem.sign * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()
+    )
 
 
 def _pose_question(design: Solution, level: float | None) -> Question:
-    """Whether any design is better by a gap of this level; with None whether any design is feasible."""
-    limit = None if level is None else design.value - design.problem.posed.sign * _gap(design.value, level)
-    return Question(design.problem.posed, _cases(design), limit, typical_size(design.of_polynomial.roots))
+    """Ask whether any design is better by a gap of this level; None asks whether any design is feasible."""
+    problem = design.problem.posed
+    limit = None if level is None else design.value - problem.sign * _gap(design.value, level)
+    return Question(problem, _cases(design), limit, typical_size(design.of_polynomial.roots))
 
 
 def _proved_bound(design: Solution, level: float, clock: Clock) -> Bound:
@@ -205,33 +211,37 @@ def _proved_bound(design: Solution, level: float, clock: Clock) -> Bound:
 
 
 def _search_bound(value: float, gap: float, proven: bool, clock: Clock) -> Bound:
-    method, took = SOLVER.name.lower(), (clock.seconds_used, clock.nodes)
-    return Bound(value, gap, proven, method, *took, tolerance=SOLVER.tolerance, solver=SOLVER.name)
+    """A bound with the solver, its time and its nodes."""
+    name = SOLVER.name
+    return Bound(value, gap, proven, name.lower(), clock.seconds_used, clock.nodes, SOLVER.tolerance, name)
 
 
-def _stronger_bound(design: Solution, known: Bound, searched: Bound) -> Bound:
+def _stronger_bound(design: Solution, known_bound: Bound, search_bound: Bound) -> Bound:
     """The better of two bounds, with the time and nodes of the search."""
-    if searched.gap <= known.gap or not math.isfinite(known.value):
-        return searched
-    proven = known.gap <= _gap(design.value, PROVEN)
-    return replace(searched, value=known.value, gap=known.gap, proven=proven, method=known.method)
+    if search_bound.gap <= known_bound.gap or not math.isfinite(known_bound.value):
+        return search_bound
+    proven = known_bound.gap <= _gap(design.value, PROVEN)
+    return replace(search_bound, value=known_bound.value, gap=known_bound.gap, proven=proven, method=known_bound.method)
 
 
 def _gap(value: float, level: float) -> float:
+    """The absolute gap of a level."""
     return level * max(MIN_SIZE, abs(value))
 
 
 def _cases(design: Solution) -> tuple[Case, ...]:
     """The listed cases, and the worst cases found between them."""
-    listed = design.problem.posed.cases
-    worst = [case for case in (design.worst, design.least_damped) if case is not None and case not in listed]
-    return (*listed, *dict.fromkeys(worst)) if listed else ()
+    listed_cases = design.problem.posed.cases
+    worst_cases = [
+        case for case in (design.worst, design.least_damped) if case is not None and case not in listed_cases
+    ]
+    return (*listed_cases, *dict.fromkeys(worst_cases)) if listed_cases else ()
 
 
-def _note_failure(design: Solution, words: str) -> Solution:
+def _note_failure(design: Solution, text: str) -> Solution:
     """Add a note, and the solver's name to the bound; more time would not help."""
-    return replace(_add_note(design, words), bound=replace(design.bound, solver=SOLVER.name))
+    return replace(_add_note(design, text), bound=replace(design.bound, solver=SOLVER.name))
 
 
-def _add_note(design: Solution, words: str) -> Solution:
-    return replace(design, notes=(*design.notes, words))
+def _add_note(design: Solution, text: str) -> Solution:
+    return replace(design, notes=(*design.notes, text))

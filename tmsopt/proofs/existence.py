@@ -1,4 +1,7 @@
-"""Proves that a design with a root pattern exists near a stored one, and that the stored one is its rounding."""
+"""Proves that an exact design with a root pattern exists near a stored one, and that the stored one is its rounding.
+
+Ball arithmetic stands for a number by a ball: a midpoint and a radius around it that certainly hold the number.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +22,9 @@ from tmsopt.roots.patterns.structure import fit_unknowns
 EXACT = "exact factorisation"
 """The method for a design whose coefficients are fractions."""
 
-_EXTRA_DIGITS = 25  # decimal digits carried beyond the requested ones
-_ATTEMPTS = 3  # each carries twice the digits of the one before
-_AT_BOUND = 1e-9  # of a range: a parameter closer to an end counts as there
+_EXTRA_DIGITS = 25  # decimal digits of the arithmetic beyond the requested ones
+_ATTEMPTS = 3  # each attempt computes with twice the digits of the previous one
+_END_DISTANCE = 1e-9  # relative to its range: a parameter closer to an end counts as at that end
 
 
 @dataclass(frozen=True)
@@ -31,8 +34,10 @@ class ProvedDesign:
     Attributes:
         parameters: every parameter as a ball, angles in radians.
         tangents: tangents of the angles.
-        unknowns: unknowns of the pattern, and lifted quantities.
-        uniqueness: no other solution is this near, in each parameter moved and each unknown; inf if nothing is moved.
+        unknowns: unknowns of the pattern, and quantities with an equation of their own.
+        moved: parameters that were solved for; the others keep their stored values.
+        uniqueness: distance within which no other solution exists, in each moved parameter and each unknown; inf if no
+            parameter is moved.
         radius: the largest radius of the balls.
         distance: from the stored design, in the parameter with the largest distance relative to `explained`.
         explained: the distance that rounding explains in that parameter.
@@ -52,80 +57,94 @@ class ProvedDesign:
 
 
 def prove_exactly(problem: Posed, pattern: Pattern, design: ExactDesign) -> ProvedDesign | None:
-    """Prove the design itself by exact factorisation; None if its numbers are no fractions or lack the pattern."""
-    found = enclose_stored(problem, design)
-    if found is None or found.method != EXACT or any(c.equality for c in problem.conditions.values()):
+    """Prove the stored design by exact factorisation; None if its numbers are no fractions or lack the pattern."""
+    proved_design = enclose_stored(problem, design)
+    if proved_design is None or proved_design.method != EXACT or any(c.equality for c in problem.conditions.values()):
         return None
-    return found if has_pattern(pattern.form, found.coefficients) else None
+    return proved_design if has_pattern(pattern.form, proved_design.coefficients) else None
 
 
 def enclose_stored(problem: Posed, design: ExactDesign) -> ProvedDesign | None:
-    """The stored design in balls, whatever its roots; None if a0 may be 0."""
-    balls, of = design.balls(), problem.parameter_set
-    tangents = {n: x for n, x in _exact_numbers(problem, design).items() if of[n].tangent}
-    exact = design.coefficients(problem.model, of)
-    a = problem.model.coefficients(balls, of) if exact is None else exact
+    """Enclose the roots of the stored design in balls, whatever their pattern; None if a0 may be 0."""
+    balls, parameter_set = design.balls(), problem.parameter_set
+    tangents = {n: x for n, x in _exact_numbers(problem, design).items() if parameter_set[n].tangent}
+    exact_coefficients = design.coefficients(problem.model, parameter_set)
+    a = problem.model.coefficients(balls, parameter_set) if exact_coefficients is None else exact_coefficients
     if a[0] == 0 or flint.arb(a[0]).contains(0) or not all(flint.arb(c).is_finite() for c in a):
         return None
-    if exact is not None:
+    if exact_coefficients is not None:
         return ProvedDesign(EXACT, a, balls, tangents, {}, factor_polynomial(a))
-    whole = Factorisation((([c / a[0] for c in a], 1),))
-    return ProvedDesign("isolated roots", a, balls, tangents, {}, whole, radius=largest_radius(list(balls.values())))
+    factorisation = Factorisation((([c / a[0] for c in a], 1),))
+    return ProvedDesign(
+        "isolated roots", a, balls, tangents, {}, factorisation, radius=largest_radius(list(balls.values()))
+    )
 
 
 def prove_nearby(
-    problem: Posed, pattern: Pattern, design: ExactDesign, stored: Mapping[str, float], digits: int
+    problem: Posed, pattern: Pattern, design: ExactDesign, stored_values: Mapping[str, float], digits: int
 ) -> ProvedDesign:
-    """Prove by Krawczyk's test the design with a pattern whose rounding is the stored one.
+    """Prove by Krawczyk's test that a design with a pattern exists whose rounding is the stored one.
 
     Raises:
-        ProofFailed: if the proof fails; gives the reason.
+        ProofFailed: if the proof fails; the message gives the reason.
     """
-    system, carried = build_equations(problem, pattern, stored), digits + _EXTRA_DIGITS
+    system, working_digits = build_equations(problem, pattern, stored_values), digits + _EXTRA_DIGITS
     for _ in range(_ATTEMPTS):
-        with flint.ctx.workdps(carried):
-            found = _search_nearby(system, design, stored, carried - _EXTRA_DIGITS // 2)
-            small = flint.arb(10) ** -(digits + GUARD)
-            balls = [*found.parameters.items(), *found.unknowns.items()]
-            if all(b.rad() <= small * (system.units.get(n, 1) + abs(b)) for n, b in balls):
-                return found
-        carried *= 2
+        with flint.ctx.workdps(working_digits):
+            proved_design = _search_nearby(system, design, stored_values, working_digits - _EXTRA_DIGITS // 2)
+            tolerance = flint.arb(10) ** -(digits + GUARD)
+            balls = [*proved_design.parameters.items(), *proved_design.unknowns.items()]
+            if all(b.rad() <= tolerance * (system.units.get(n, 1) + abs(b)) for n, b in balls):
+                return proved_design
+        working_digits *= 2
     raise ProofFailed(f"the balls do not shrink to {digits} digits; ask for fewer digits")
 
 
-def _search_nearby(system: Equations, design: ExactDesign, stored: Mapping[str, float], digits: int) -> ProvedDesign:
+def _search_nearby(
+    system: Equations, design: ExactDesign, stored_values: Mapping[str, float], digits: int
+) -> ProvedDesign:
+    """Try each choice of parameters to move and each start of the unknowns; the first proof counts."""
     problem, pattern = system.problem, system.pattern
-    held = _exact_numbers(problem, design)
-    free = [n for n in problem.free if n not in {s.removeprefix("tan(").removesuffix(")") for s in design.stated}]
+    exact_values = _exact_numbers(problem, design)
+    free_names = [n for n in problem.free if n not in {s.removeprefix("tan(").removesuffix(")") for s in design.stated}]
     reasons: list[str] = []
-    for among in _parameter_choices(problem, stored, free, system.conditions):
-        for unknowns in _starts(system, held, problem):
-            start = {**held, **unknowns}
+    for candidates in _parameter_choices(problem, stored_values, free_names, system.conditions):
+        for unknowns in _start_values(system, exact_values):
+            start = {**exact_values, **unknowns}
             try:
-                return _prove_from(system, start, among, digits)
+                return _prove_from(system, start, candidates, digits)
             except ProofFailed as refusal:
                 reasons.append(str(refusal))
     raise ProofFailed(reasons[0] if reasons else f"no {pattern.name} found near the design")
 
 
-def _parameter_choices(problem: Posed, stored: Mapping[str, float], free: list[str], count: int) -> Iterator[list[str]]:
-    """Yield choices of parameters to move: first only those inside their ranges, which keeps the design in the box."""
-    ends = {n: problem.free[n] for n in free}
-    inner = [n for n, (lo, hi) in ends.items() if min(stored[n] - lo, hi - stored[n]) > _AT_BOUND * (hi - lo)]
-    if len(inner) >= count:
-        yield inner
-    if inner != free or len(inner) < count:
-        yield free
+def _parameter_choices(
+    problem: Posed, stored_values: Mapping[str, float], free_names: list[str], count: int
+) -> Iterator[list[str]]:
+    """Yield choices of parameters to move: first only those inside their ranges, to keep the design in the box."""
+    ends = {n: problem.free[n] for n in free_names}
+    inner_names = [
+        n
+        for n, (lo, hi) in ends.items()
+        if min(stored_values[n] - lo, hi - stored_values[n]) > _END_DISTANCE * (hi - lo)
+    ]
+    if len(inner_names) >= count:
+        yield inner_names
+    if inner_names != free_names or len(inner_names) < count:
+        yield free_names
 
 
-def _starts(system: Equations, held: Mapping[str, Any], problem: Posed) -> Iterator[dict[str, Any]]:
+def _start_values(system: Equations, exact_values: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield start values of the unknowns, from the nearest polynomials of the pattern and the quantities' values."""
-    of = problem.parameter_set
-    own = {n: float(held[n].atan()) if of[n].tangent else float(held[n]) for n in of.names}
-    values = problem.values(own)
+    problem, parameter_set = system.problem, system.problem.parameter_set
+    parameters = {
+        n: float(exact_values[n].atan()) if parameter_set[n].tangent else float(exact_values[n])
+        for n in parameter_set.names
+    }
+    values = problem.values(parameters)
     lifted = {q.name: flint.arb(float(values[q.name])) for q in system.lifted}
     scale = Scale(system.unit)
-    coefficients = scale.scale_coefficients([float(c) for c in problem.model.coefficients(own, of)])
+    coefficients = scale.scale_coefficients([float(c) for c in problem.model.coefficients(parameters, parameter_set)])
     try:
         fits = fit_unknowns(system.pattern, coefficients)
     except ValueError:
@@ -135,18 +154,18 @@ def _starts(system: Equations, held: Mapping[str, Any], problem: Posed) -> Itera
         yield lifted | {n: flint.arb(x * u) for n, x, u in zip(system.pattern_unknowns, fit, units, strict=True)}
 
 
-def _prove_from(system: Equations, start: Mapping[str, Any], among: list[str], digits: int) -> ProvedDesign:
-    problem, pattern = system.problem, system.pattern
-    of = problem.parameter_set
-    chosen = choose_moved(system, start, among)
-    names = [*chosen.moved, *system.unknowns]
+def _prove_from(system: Equations, start: Mapping[str, Any], candidates: list[str], digits: int) -> ProvedDesign:
+    """Prove a design from start values of all parameters and unknowns."""
+    parameter_set = system.problem.parameter_set
+    choice = choose_moved(system, start, candidates)
+    names = [*choice.moved, *system.unknowns]
     middle = refine_solution(system, start, names, digits, system.units)
     enclosure = enclose_solution(system, middle, names, digits, system.units)
     at = {**middle, **enclosure.balls}
-    distance, explained = _measure_distance(chosen, start, enclosure, system.units)
-    tangents = {n: at[n] for n in of.names if of[n].tangent}
-    parameters = {n: at[n].atan() if n in tangents else at[n] for n in of.names}
-    coefficients = problem.model.coefficients(parameters, of)
+    distance, explained = _measure_distance(choice, start, enclosure, system.units)
+    tangents = {n: at[n] for n in parameter_set.names if parameter_set[n].tangent}
+    parameters = {n: at[n].atan() if n in tangents else at[n] for n in parameter_set.names}
+    coefficients = system.problem.model.coefficients(parameters, parameter_set)
     unknowns = [at[n] for n in system.pattern_unknowns]
     _check_solution(system, coefficients, at)
     return ProvedDesign(
@@ -155,8 +174,8 @@ def _prove_from(system: Equations, start: Mapping[str, Any], among: list[str], d
         parameters,
         tangents,
         {n: at[n] for n in system.unknowns},
-        factor_pattern(pattern, unknowns),
-        chosen.moved,
+        factor_pattern(system.pattern, unknowns),
+        choice.moved,
         enclosure.uniqueness * min((system.units.get(n, 1.0) for n in names), default=1.0),
         largest_radius([at[n] for n in names]),
         distance,
@@ -165,36 +184,37 @@ def _prove_from(system: Equations, start: Mapping[str, Any], among: list[str], d
 
 
 def _measure_distance(
-    chosen: MovedParameters, start: Mapping[str, Any], enclosure: Enclosure, units: Mapping[str, float]
+    choice: MovedParameters, start: Mapping[str, Any], enclosure: Enclosure, units: Mapping[str, float]
 ) -> tuple[float, float]:
-    """Distance of the stored design from the proved one, and the distance that rounding explains.
+    """Measure the distance of the stored design from the proved one, and the distance that rounding explains.
 
     Raises:
         ProofFailed: if rounding does not explain the distance, or if it could leave the box in which the solution is
             unique. Next to an EP4, for example, the last bit of a stored number would select one of many EP3s.
     """
-    explained = chosen.explained
-    off = {n: upper(abs(enclosure.balls[n] - start[n])) for n in chosen.moved}
-    unique = {n: enclosure.uniqueness * units.get(n, 1.0) for n in explained}
-    loose = max(explained, key=lambda n: explained[n] / unique[n], default=None)
-    if loose and not explained[loose] < unique[loose]:
+    explained = choice.explained
+    distances = {n: upper(abs(enclosure.balls[n] - start[n])) for n in choice.moved}
+    reach = {n: enclosure.uniqueness * units.get(n, 1.0) for n in explained}
+    weakest = max(explained, key=lambda n: explained[n] / reach[n], default=None)
+    if weakest and not explained[weakest] < reach[weakest]:
         raise ProofFailed(
-            f"nearly singular: rounding alone moves {loose} by {explained[loose]:.2g}, but the solution is unique only "
-            f"within {unique[loose]:.2g}; hold another parameter, or give exact numbers"
+            f"nearly singular: rounding alone moves {weakest} by {explained[weakest]:.2g}, but the solution is unique "
+            f"only within {reach[weakest]:.2g}; hold another parameter, or give exact numbers"
         )
-    worst = max(off, key=lambda n: off[n] / explained[n], default=None)
-    if worst is None:
+    farthest = max(distances, key=lambda n: distances[n] / explained[n], default=None)
+    if farthest is None:
         return 0.0, 0.0
-    if off[worst] > explained[worst]:
+    if distances[farthest] > explained[farthest]:
         raise ProofFailed(
-            f"not the design's: the nearest one is {off[worst]:.2g} from the stored {worst}; rounding explains only "
-            f"{explained[worst]:.2g} ({ROUNDINGS} roundings of each number); solve again, or give all digits"
+            f"not the design's: the nearest one is {distances[farthest]:.2g} from the stored {farthest}; rounding "
+            f"explains only {explained[farthest]:.2g} ({ROUNDINGS} roundings of each number); solve again, "
+            "or give all digits"
         )
-    return off[worst], explained[worst]
+    return distances[farthest], explained[farthest]
 
 
 def _check_solution(system: Equations, coefficients: Sequence[Any], at: Mapping[str, Any]) -> None:
-    """Check the conditions that are no equations.
+    """Check the conditions that are not equations.
 
     Raises:
         ProofFailed: for a0 = 0, a quantity out of its range, or another kind of pattern.
@@ -216,14 +236,14 @@ def _check_solution(system: Equations, coefficients: Sequence[Any], at: Mapping[
 
 
 def _other_kind(pattern: Pattern) -> str:
-    kinds = {
+    known_reasons = {
         "2EP2": "the double pair is complex: a CEP2, not a 2EP2",
         "CEP2": "two real double roots: a 2EP2, not a CEP2",
     }
-    other = "the factors have no imaginary roots"
+    reason = "the factors have no imaginary roots"
     if _needs_discriminant(pattern):
-        other = "multiple roots are complex instead of real, or real instead of complex"
-    return kinds.get(pattern.name, f"{other}: no {pattern.name}")
+        reason = "multiple roots are complex instead of real, or real instead of complex"
+    return known_reasons.get(pattern.name, f"{reason}: no {pattern.name}")
 
 
 def _undecided_kind(pattern: Pattern) -> str:
@@ -240,10 +260,14 @@ def _needs_discriminant(pattern: Pattern) -> bool:
 
 
 def _exact_numbers(problem: Posed, design: ExactDesign) -> dict[str, Any]:
-    """The exact value of every parameter as a ball; of an angle, its tangent."""
-    of = problem.parameter_set
+    """Each parameter → a ball around its exact value; for an angle, around its tangent."""
+    parameter_set = problem.parameter_set
     numbers = {n: e.ball() for n, e in design.values.items()}
     return {
-        n: design.tangents[n].ball() if n in design.tangents else numbers[n].tan() if of[n].tangent else numbers[n]
-        for n in of.names
+        n: design.tangents[n].ball()
+        if n in design.tangents
+        else numbers[n].tan()
+        if parameter_set[n].tangent
+        else numbers[n]
+        for n in parameter_set.names
     }

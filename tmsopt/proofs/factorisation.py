@@ -1,4 +1,4 @@
-"""Factorisation of a polynomial in balls: its roots, stability, heavy damping, patterns."""
+"""Factorises polynomials and decides their roots, stability, heavy damping and patterns in ball arithmetic."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -25,19 +25,19 @@ class Factorisation:
     @cached_property
     def roots(self) -> tuple[EnclosedRoot, ...] | None:
         """All roots, rightmost first, with exact multiplicities; None if the balls of two roots overlap."""
-        found: list[EnclosedRoot] = []
+        roots: list[EnclosedRoot] = []
         for factor, multiplicity in self.factors:
-            own = factor_roots(factor)
-            if own is None:
+            own_roots = factor_roots(factor)
+            if own_roots is None:
                 return None
-            found += [replace(z, multiplicity=multiplicity * z.multiplicity) for z in own]
-        if any(a.re.overlaps(b.re) and a.im.overlaps(b.im) for k, a in enumerate(found) for b in found[k + 1 :]):
+            roots += [replace(z, multiplicity=multiplicity * z.multiplicity) for z in own_roots]
+        if any(a.re.overlaps(b.re) and a.im.overlaps(b.im) for k, a in enumerate(roots) for b in roots[k + 1 :]):
             return None
-        return rightmost_first(found)
+        return rightmost_first(roots)
 
     @cached_property
     def abscissa(self) -> Any:
-        """The largest real part; None if it is undecided for a factor."""
+        """The largest real part; None if a factor leaves it undecided."""
         return _extreme(flint.arb.max, [_rightmost(factor) for factor, _ in self.factors])
 
     @cached_property
@@ -58,11 +58,13 @@ class Factorisation:
 
     @cached_property
     def heavily_damped(self) -> bool | None:
-        """Whether all roots are real and negative, multiple ones included."""
+        """Whether all roots are real and negative; multiple roots are allowed."""
         if self.stable is False:
             return False
-        each = (factor_roots(factor) for factor, _ in self.factors)
-        return _all_hold([self.stable, *(None if own is None else all(z.real for z in own) for own in each)])
+        root_lists = (factor_roots(factor) for factor, _ in self.factors)
+        return _all_hold(
+            [self.stable, *(None if roots is None else all(z.real for z in roots) for roots in root_lists)]
+        )
 
 
 def factor_pattern(pattern: Pattern, unknowns: Sequence[Any]) -> Factorisation:
@@ -81,10 +83,10 @@ def abscissa_formula(pattern: Pattern, unknowns: Sequence[Any]) -> Any:
 def _abscissa_formula(factor: Factor) -> Any:
     """The largest real part of the roots of a factor, as a ball or a series; None if their balls overlap."""
     constants = [_centre(c) for c in factor]
-    own = factor_roots(constants)
-    if own is None:
+    roots = factor_roots(constants)
+    if roots is None:
         return None
-    z = max(own, key=lambda z: (float(z.re), -abs(float(z.im))))
+    z = max(roots, key=lambda z: (float(z.re), -abs(float(z.im))))
     if not any(isinstance(c, flint.arb_series) for c in factor):
         return z.re
     # The root moves by −Σ δc_k s^(n−k)/p′(s), with s anywhere in its ball.
@@ -95,7 +97,7 @@ def _abscissa_formula(factor: Factor) -> Any:
 
 
 def _rightmost(factor: Factor) -> Any:
-    """The largest real part of the roots of a factor; of a quadratic one for any sign of its discriminant."""
+    """The largest real part of the roots of a factor; a quadratic factor may have a discriminant of unknown sign."""
     if len(factor) == 3:
         b, c = flint.arb(factor[1]), flint.arb(factor[2])
         discriminant = b * b - 4 * c
@@ -124,7 +126,7 @@ def _centre(value: Any) -> Any:
 
 
 def factor_polynomial(coefficients: Sequence[Any]) -> Factorisation:
-    """Irreducible factors of a polynomial with fractions (descending), with exact multiplicities."""
+    """Factorise a polynomial with fractions (descending) into irreducible factors, with exact multiplicities."""
     polynomial = flint.fmpq_poly(list(reversed(coefficients)))
     parts: list[tuple[Any, int]] = polynomial.factor()[1]
     return Factorisation(tuple((_monic(part), int(multiplicity)) for part, multiplicity in parts))
@@ -140,44 +142,44 @@ def has_pattern(pattern: str, coefficients: Sequence[Any]) -> bool:
     Weave and resonance hold if the even and the odd part of the polynomial share a root s² < 0.
     """
     try:
-        wanted = composition(pattern)
-    except ValueError:  # a tie of roots on the rightmost line
+        components = composition(pattern)
+    except ValueError:  # the pattern ties roots on the rightmost line
         return False
     if coefficients[0] == 0:
         return False
-    found = _count_multiple_roots(coefficients)
-    kinds = {kind for kind, _, _ in wanted}
-    held = {
+    counts = _count_multiple_roots(coefficients)
+    kinds = {kind for kind, _, _ in components}
+    axis_patterns = {
         "capsize": coefficients[-1] == 0,
         "weave": _has_imaginary_pair(coefficients, 1),
         "resonance": _has_imaginary_pair(coefficients, 2),
     }
-    if "CEP" in kinds and kinds & {"weave", "resonance"} and held["resonance"]:
+    if "CEP" in kinds and kinds & {"weave", "resonance"} and axis_patterns["resonance"]:
         return False  # a double pair on the axis must not count for both
-    return all(held.get(kind, found[kind, order] == count) for kind, order, count in wanted)
+    return all(axis_patterns.get(kind, counts[kind, order] == count) for kind, order, count in components)
 
 
 def multiple_roots(coefficients: Sequence[Any]) -> str:
     """The pattern of all multiple roots of a polynomial with fractions, e.g. ``EP3+CEP2``, or empty."""
     if coefficients[0] == 0:
         return ""
-    found = sorted(_count_multiple_roots(coefficients).items(), key=lambda item: (item[0][0] != "EP", -item[0][1]))
-    return "+".join(f"{count if count > 1 else ''}{kind}{order}" for (kind, order), count in found)
+    counts = sorted(_count_multiple_roots(coefficients).items(), key=lambda item: (item[0][0] != "EP", -item[0][1]))
+    return "+".join(f"{count if count > 1 else ''}{kind}{order}" for (kind, order), count in counts)
 
 
 def _count_multiple_roots(coefficients: Sequence[Any]) -> Counter[tuple[str, int]]:
     """Number of multiple real roots (EP) and complex pairs (CEP) of each multiplicity."""
-    found: Counter[tuple[str, int]] = Counter()
+    counts: Counter[tuple[str, int]] = Counter()
     for factor, multiplicity in factor_polynomial(coefficients).factors:
         for z in (factor_roots(factor) or ()) if multiplicity > 1 else ():
             if z.real or z.im > 0:
-                found["EP" if z.real else "CEP", multiplicity] += 1
-    return found
+                counts["EP" if z.real else "CEP", multiplicity] += 1
+    return counts
 
 
 def _has_imaginary_pair(coefficients: Sequence[Any], order: int) -> bool:
     """Whether a pair of at least this multiplicity lies on the imaginary axis, 0 excluded."""
     even, odd = (flint.fmpq_poly([(-1) ** k * c for k, c in enumerate(coefficients[::-1][i::2])]) for i in (0, 1))
-    common = even if odd.is_zero() else even.gcd(odd)
-    parts = [part for part, m in common.factor()[1] if m >= order]
+    common_factor = even if odd.is_zero() else even.gcd(odd)
+    parts = [part for part, m in common_factor.factor()[1] if m >= order]
     return any(z.real and z.re > 0 for part in parts for z in factor_roots(_monic(part)) or ())

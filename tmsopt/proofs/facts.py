@@ -1,4 +1,4 @@
-"""Facts about a design with roots in balls: eigenvectors, stability, heavy damping, box and limits."""
+"""Decides facts about a proved design: eigenvectors, stability, heavy damping, the box and the limits."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -22,8 +22,8 @@ class Verdict:
     """Whether something certainly holds.
 
     Attributes:
-        holds: None if undecided or not checked.
-        words: the fact, or the reason.
+        holds: True or False if it is certain; None if it is undecided or was not checked.
+        words: the fact, or the reason why it is undecided.
     """
 
     holds: bool | None = None
@@ -32,37 +32,50 @@ class Verdict:
 
 NOT_CHECKED = Verdict()
 
+# A root, several roots, the unstable side, the stable side, and the stable side in short.
+_ROOT_WORDS = "a root", "roots", "right of the imaginary axis", "left of the imaginary axis", "left of the axis"
+_EIGENFREQUENCY_WORDS = (
+    "an eigenfrequency",
+    "eigenfrequencies",
+    "above the real axis",
+    "below the real axis",
+    "below the axis",
+)
+
 BINDS = 1e-9
-"""Difference between the sides of a comparison up to which it binds: the remainder that a solver leaves."""
+"""A comparison binds if its sides differ by at most this; a solver leaves such remainders."""
 
 
-def eigenvector_verdict(problem: Posed, design: ExactDesign, found: ProvedDesign) -> tuple[int | None, Verdict]:
+def eigenvector_verdict(problem: Posed, design: ExactDesign, proved_design: ProvedDesign) -> tuple[int | None, Verdict]:
     """The largest geometric multiplicity of a multiple root, and whether all multiple roots are defective.
 
-    Computed in fractions for an exact design; otherwise by minors in balls, which can only prove one eigenvector.
+    For an exact design they are computed in fractions; otherwise from minors in ball arithmetic, which can only prove
+    that each root has one eigenvector.
     """
-    repeated = [factor for factor, count in found.factorisation.factors if count > 1]
-    pencil, of = problem.model.pencil, problem.parameter_set
+    repeated_factors = [factor for factor, count in proved_design.factorisation.factors if count > 1]
+    pencil, parameter_set = problem.model.pencil, problem.parameter_set
     if pencil is None:
         return None, Verdict(None, "a model given by its coefficients has no eigenvectors")
-    if not repeated:
+    if not repeated_factors:
         return None, NOT_CHECKED
-    matrices = design.matrices(problem.model, of) if found.method == EXACT else None
+    matrices = design.matrices(problem.model, parameter_set) if proved_design.method == EXACT else None
     if matrices:
-        parts = flint.fmpq_poly(list(found.coefficients)[::-1]).factor()[1]
+        parts = flint.fmpq_poly(list(proved_design.coefficients)[::-1]).factor()[1]
         nullities = [(exact_nullity(matrices, part), int(count)) for part, count in parts if count > 1]
-        most = max(nullity for nullity, _ in nullities)
+        largest_nullity = max(nullity for nullity, _ in nullities)
         defective = all(nullity < count for nullity, count in nullities)
-        return most, Verdict(defective, f"{most} eigenvector{'s' * (most > 1)}, in fractions")
-    at = pencil(of.native(found.parameters))
-    roots = [flint.acb(z.re, z.im) for f in repeated for z in factor_roots(f) or ()]
-    one = bool(roots) and all(has_one_eigenvector(at, s) for s in roots)
+        return largest_nullity, Verdict(
+            defective, f"{largest_nullity} eigenvector{'s' * (largest_nullity > 1)}, in fractions"
+        )
+    matrices_at = pencil(parameter_set.native(proved_design.parameters))
+    roots = [flint.acb(z.re, z.im) for f in repeated_factors for z in factor_roots(f) or ()]
+    has_one = bool(roots) and all(has_one_eigenvector(matrices_at, s) for s in roots)
     words = (
         "one eigenvector, because a minor of the matrix is not 0 (interval arithmetic)"
-        if one
+        if has_one
         else "every minor may be 0"
     )
-    return (1 if one else None), Verdict(True if one else None, words)
+    return (1 if has_one else None), Verdict(True if has_one else None, words)
 
 
 def stability_verdict(factorisation: Factorisation, of_H: bool = False) -> Verdict:
@@ -71,27 +84,28 @@ def stability_verdict(factorisation: Factorisation, of_H: bool = False) -> Verdi
     Args:
         of_H: word the verdict for eigenfrequencies ω = i s.
     """
-    one, right, left, below = "a root", "right of the imaginary axis", "left of the imaginary axis", "left of the axis"
-    if of_H:
-        one, right, left, below = "an eigenfrequency", "above the real axis", "below the real axis", "below the axis"
+    subject, subjects, unstable_side, stable_side, inside = _EIGENFREQUENCY_WORDS if of_H else _ROOT_WORDS
     if factorisation.stable:
-        every = "all eigenfrequencies" if of_H else "all roots"
-        return Verdict(True, f"{every} are {left} (signs of Routh–Hurwitz expressions, by interval arithmetic)")
+        return Verdict(
+            True, f"all {subjects} are {stable_side} (signs of Routh–Hurwitz expressions, by interval arithmetic)"
+        )
     if factorisation.stable is None:
         return Verdict(
             None, "a Routh–Hurwitz expression is 0 up to its error: more --digits decide unless it is exactly 0"
         )
     roots = factorisation.roots or ()
-    axis = [z for z in roots if z.re == 0]
-    if not axis or any(z.re > 0 for z in roots):
-        return Verdict(False, f"{one} is {right if any(z.re > 0 for z in roots) else f'not {left}'}")
-    at = f"{one} is real" if of_H else "a root is 0" if all(z.real for z in axis) else "a pair is imaginary"
-    simple = all(z.multiplicity == 1 for z in roots if z.re <= 0)
-    return Verdict(False, at + f", the others {below}: on the boundary of stability" * simple)
+    axis_roots = [z for z in roots if z.re == 0]
+    if not axis_roots or any(z.re > 0 for z in roots):
+        return Verdict(False, f"{subject} is {unstable_side if any(z.re > 0 for z in roots) else f'not {stable_side}'}")
+    sentence = (
+        f"{subject} is real" if of_H else "a root is 0" if all(z.real for z in axis_roots) else "a pair is imaginary"
+    )
+    is_simple = all(z.multiplicity == 1 for z in roots if z.re <= 0)
+    return Verdict(False, sentence + f", the others {inside}: on the boundary of stability" * is_simple)
 
 
 def heavy_damping_verdict(factorisation: Factorisation) -> Verdict:
-    """Whether all roots are real and negative, and whether strictly."""
+    """Whether all roots are real and negative, and whether they are also different."""
     if factorisation.heavily_damped is None:
         return Verdict(None, "some roots may be real or complex: more --digits decide unless they coincide")
     if not factorisation.heavily_damped:
@@ -101,45 +115,48 @@ def heavy_damping_verdict(factorisation: Factorisation) -> Verdict:
     return Verdict(True, "all roots are real, negative and different: strictly inside heavy damping")
 
 
-def box_verdict(problem: Posed, design: ExactDesign, found: ProvedDesign) -> Verdict:
+def box_verdict(problem: Posed, design: ExactDesign, proved_design: ProvedDesign) -> Verdict:
     """Whether every free parameter certainly lies within its limits."""
     if not problem.free:
         return Verdict(True, "nothing is free")
-    undecided = []
+    undecided_names = []
     for name, (least, greatest) in problem.free.items():
-        value: Any = flint.arb(found.parameters[name])
-        if name not in (*found.moved, *design.tangents) and (known := design.values[name].fraction) is not None:
-            value = rational(known)
+        value: Any = flint.arb(proved_design.parameters[name])
+        if (
+            name not in (*proved_design.moved, *design.tangents)
+            and (exact_value := design.values[name].fraction) is not None
+        ):
+            value = rational(exact_value)
         if {name, f"tan({name})"} & set(design.stated) and float(value) in (least, greatest):
             continue  # the user states the limit exactly
         lo, hi = (problem.exactly({name: end})[name] for end in (least, greatest))
         if value < lo or value > hi:
             return Verdict(False, f"{name} is outside its limits")
         if not (value >= lo and value <= hi):
-            undecided.append(name)
-    if undecided:
-        return Verdict(None, f"{', '.join(undecided)} may lie on either side of a limit")
+            undecided_names.append(name)
+    if undecided_names:
+        return Verdict(None, f"{', '.join(undecided_names)} may lie on either side of a limit")
     return Verdict(True, "every free parameter is within its limits")
 
 
-def limit_verdicts(problem: Posed, found: ProvedDesign) -> dict[str, str]:
-    """The verdict on each comparison at the nominal design; none if it must hold in several cases."""
+def limit_verdicts(problem: Posed, proved_design: ProvedDesign) -> dict[str, str]:
+    """The verdict on each comparison at the nominal design; empty if the problem has several cases."""
     if problem.scenarios or problem.tolerances:
         return {}
-    roots = found.factorisation
-    known = {
+    roots = proved_design.factorisation
+    root_values = {
         "abscissa": roots.abscissa,
         "damping_ratio": roots.damping_ratio,
         ANGULAR_FREQUENCY: roots.angular_frequency,
         RADIUS: None,
     }
-    values = Values(problem.model, problem.parameter_set, found.parameters)
-    values = values.with_known({n: flint.arb("nan") if value is None else value for n, value in known.items()})
+    values = Values(problem.model, problem.parameter_set, proved_design.parameters)
+    values = values.with_known({n: flint.arb("nan") if value is None else value for n, value in root_values.items()})
     verdicts = {}
     for name, condition in problem.conditions.items():
         difference = flint.arb(condition.of(values, BALLS))
         if condition.equality:
-            verdicts[name] = _equality_verdict(difference, equations=found.method == "Krawczyk")
+            verdicts[name] = _equality_verdict(difference, equations=proved_design.method == "Krawczyk")
         else:
             verdicts[name] = _inequality_verdict(difference if condition.sign < 0 else -difference)
     return verdicts
@@ -148,8 +165,8 @@ def limit_verdicts(problem: Posed, found: ProvedDesign) -> dict[str, str]:
 def _equality_verdict(difference: Any, equations: bool) -> str:
     if difference == 0 or (equations and difference.contains(0)):
         return "met"
-    off = "not decided" if not difference.is_finite() else f"met but for {abs(float(difference.mid())):.1e}"
-    return off if abs(difference) <= BINDS or not difference.is_finite() else "violated"
+    verdict = "not decided" if not difference.is_finite() else f"met but for {abs(float(difference.mid())):.1e}"
+    return verdict if abs(difference) <= BINDS or not difference.is_finite() else "violated"
 
 
 def _inequality_verdict(room: Any) -> str:

@@ -1,4 +1,4 @@
-"""Proves that the design a problem asks for exists: solve first, then prove."""
+"""Proves that the design exists which a problem asks for: solves the problem first, then proves."""
 
 import math
 import time
@@ -44,7 +44,7 @@ DIGITS = 30
 
 MAX_DIGITS = 1000
 _QUARTIC = 4  # the degree of `PATTERNS`
-_EXTRA_DIGITS = 50  # decimal digits carried beyond twice the requested ones, for a design taken as stored
+_EXTRA_DIGITS = 50  # decimal digits of the arithmetic beyond twice the requested ones, for a design taken as stored
 
 _SIMPLE_CLAIMS = {
     "pair": "the rightmost roots are a simple complex pair",
@@ -73,7 +73,7 @@ class Proof(Printable):
         stated: the held numbers that the user gave exactly.
         numbers: non-integers in formulas, as written; each stands for its decimal.
         radius: the largest radius among the numbers solved for.
-        uniqueness: no other solution is this near, in each of these numbers; inf if none is solved for.
+        uniqueness: distance within which no other solution exists, in each number solved for; inf if there is none.
         distance: from the stored design, in the parameter with the largest distance relative to `explained`.
         explained: how far rounding of the stored numbers may move that parameter.
         roots: with exact multiplicities, rightmost first; empty if the balls of two overlap.
@@ -167,25 +167,25 @@ def prove(
 
     More: docs/explanation/proofs.md
     """
-    wrong = [name for name in options if name != "progress"]
-    if isinstance(design, Solution) and wrong:
+    rejected = [name for name in options if name != "progress"]
+    if isinstance(design, Solution) and rejected:
         message = (
-            f"found {', '.join(wrong)}; accepted with a solution: progress; to set solver options, give the problem"
+            f"found {', '.join(rejected)}; accepted with a solution: progress; to set solver options, give the problem"
         )
         raise InputError([Fault(message, ("options",))])
-    how = make_options(options, SolveOptions)
-    found = solve_any_status(design, how)
-    problem = found.problem.posed
-    if found.status != "optimal":
-        crossings = [describe_crossing(m) for m in found.meetings if not m.exceptional]
-        reason = f"the problem is not solved ({found.status}): there is no design to prove"
+    solve_options = make_options(options, SolveOptions)
+    solution = solve_any_status(design, solve_options)
+    problem = solution.problem.posed
+    if solution.status != "optimal":
+        crossings = [describe_crossing(m) for m in solution.meetings if not m.exceptional]
+        reason = f"the problem is not solved ({solution.status}): there is no design to prove"
         if problem.pattern and crossings:
             reason = f"none found: the roots meet in {crossings[0]}"
         claim = f"a design of '{problem.title or 'the problem'}' exists"
         return Proof(claim, False, reason, digits=digits, problem=problem.problem)
-    begin(how.progress, f"proving to {digits} digits")
-    shown = found.of_polynomial
-    return prove_design(problem, found.parameters, shown.name, digits, exact, found.worst, shown.roots)
+    begin(solve_options.progress, f"proving to {digits} digits")
+    spectrum = solution.of_polynomial
+    return prove_design(problem, solution.parameters, spectrum.name, digits, exact, solution.worst, spectrum.roots)
 
 
 def prove_design(
@@ -215,58 +215,58 @@ def prove_design(
         raise InputError(faults)
     digits = int(digits)
     began = time.perf_counter()
-    varied = case.applied(parameters) if case else dict(parameters)
-    typed = {n: text for n, text in problem.typed(varied).items() if n in problem.fixed}
-    design = as_exact_design(problem.parameter_set, varied, exact, typed)
+    case_parameters = case.applied(parameters) if case else dict(parameters)
+    typed_texts = {n: text for n, text in problem.typed(case_parameters).items() if n in problem.fixed}
+    design = as_exact_design(problem.parameter_set, case_parameters, exact, typed_texts)
     with flint.ctx.workdps(2 * digits + _EXTRA_DIGITS):
         patterns = _candidate_patterns(problem, structure, roots)
         # Constraints hold for the nominal design or for every case, so those of a single case are dropped.
-        posed = problem.nominal.derive(constraints={}) if case and (case.at or case.offset) else problem
-        proof = _prove_first(posed, design, varied, structure, patterns, digits)
+        claim_problem = problem.nominal.derive(constraints={}) if case and (case.at or case.offset) else problem
+        proof = _prove_first(claim_problem, design, case_parameters, structure, patterns, digits)
         return replace(proof, problem=problem.problem, seconds=time.perf_counter() - began)
 
 
 def _prove_first(
     problem: Posed,
     design: ExactDesign,
-    varied: Mapping[str, float],
+    case_parameters: Mapping[str, float],
     structure: str,
     patterns: Sequence[Pattern],
     digits: int,
 ) -> Proof:
-    """The first proof that succeeds; otherwise the reason and the facts of the design as stored."""
+    """Return the first proof that succeeds; otherwise the reason and the facts about the design as stored."""
     reasons: list[str] = []
     for pattern in patterns or ([] if structure in _SIMPLE_CLAIMS else _exact_patterns(problem, design)):
         if exact := prove_exactly(problem, pattern, design):
             return _assemble(problem, design, pattern.name, pattern, exact, digits)
     for pattern in patterns:
         try:
-            found = prove_nearby(problem, pattern, design, varied, digits)
+            proved_design = prove_nearby(problem, pattern, design, case_parameters, digits)
         except ProofFailed as refusal:
             reasons.append(str(refusal))
         else:
-            return _assemble(problem, design, pattern.name, pattern, found, digits)
+            return _assemble(problem, design, pattern.name, pattern, proved_design, digits)
     name = problem.locate or user_structure_name(problem.model, structure)
-    expected = next((p for p in patterns if p.name == name), None)
-    stored = enclose_stored(problem, design)
-    if stored is None:
+    expected_pattern = next((p for p in patterns if p.name == name), None)
+    stored_design = enclose_stored(problem, design)
+    if stored_design is None:
         reason = reasons[0] if reasons else "a0 may be 0: a root may be at infinity"
-        return Proof(_state_claim(name, expected), False, reason, name, digits=digits)
-    reasons = reasons or _simple_doubts(problem, structure, stored)
-    return _assemble(problem, design, name, expected, stored, digits, reasons, stored=True)
+        return Proof(_state_claim(name, expected_pattern), False, reason, name, digits=digits)
+    reasons = reasons or _simple_doubts(problem, structure, stored_design)
+    return _assemble(problem, design, name, expected_pattern, stored_design, digits, reasons, stored=True)
 
 
 def _candidate_patterns(problem: Posed, structure: str, roots: Sequence[Root]) -> list[Pattern]:
-    """Patterns to prove: those that the roots show, if they imply the located one, then the located one."""
-    located = problem.pattern
+    """List the patterns to prove: those of the roots, if they imply the located pattern, and then the located one."""
+    target = problem.pattern
     quartic = PATTERNS if problem.model.degree == _QUARTIC else {}
-    shown = find_patterns(roots) if roots else [quartic[structure]] if structure in quartic else []
-    if located and not (has_pattern(roots, located.form) if roots else located.form == structure):
-        shown = []
-    named = [quartic.get(p.name, p) for p in shown]
+    patterns = find_patterns(roots) if roots else [quartic[structure]] if structure in quartic else []
+    if target and not (has_pattern(roots, target.form) if roots else target.form == structure):
+        patterns = []
+    user_patterns = [quartic.get(p.name, p) for p in patterns]
     if problem.model.carrier is not None:
-        named = [as_complex_pattern(p) for p in named]
-    return list({p.name: p for p in [*named, *([located] if located else [])]}.values())
+        user_patterns = [as_complex_pattern(p) for p in user_patterns]
+    return list({p.name: p for p in [*user_patterns, *([target] if target else [])]}.values())
 
 
 def _exact_patterns(problem: Posed, design: ExactDesign) -> list[Pattern]:
@@ -276,18 +276,18 @@ def _exact_patterns(problem: Posed, design: ExactDesign) -> list[Pattern]:
     return [pattern_of(problem.model, user_structure_name(problem.model, name))] if name else []
 
 
-def _simple_doubts(problem: Posed, structure: str, found: ProvedDesign) -> list[str]:
-    """Why the structure of a design without multiple roots is not proved; empty if it is."""
-    name = user_structure_name(problem.model, structure)
+def _simple_doubts(problem: Posed, structure: str, proved_design: ProvedDesign) -> list[str]:
+    """Say why the structure of a design without multiple roots is not proved; empty if it is proved."""
+    pattern_name = user_structure_name(problem.model, structure)
     if structure not in _SIMPLE_CLAIMS:
-        return [f"double precision cannot decide the structure {name}; locate the pattern you expect"]
-    roots = found.factorisation.roots
+        return [f"double precision cannot decide the structure {pattern_name}; locate the pattern you expect"]
+    roots = proved_design.factorisation.roots
     if roots is None:
         return ["some roots are equal or too close to isolate; locate the pattern you expect"]
-    rest = roots[1:] if roots[0].real else roots[2:]
-    if roots[0].real == (structure == "real") and all(z.re < roots[0].re for z in rest):
+    other_roots = roots[1:] if roots[0].real else roots[2:]
+    if roots[0].real == (structure == "real") and all(z.re < roots[0].re for z in other_roots):
         return []
-    return [f"the rightmost root of the design as stored is not certainly {name}"]
+    return [f"the rightmost root of the design as stored is not certainly {pattern_name}"]
 
 
 def _assemble(
@@ -295,23 +295,24 @@ def _assemble(
     design: ExactDesign,
     name: str,
     pattern: Pattern | None,
-    found: ProvedDesign,
+    proved_design: ProvedDesign,
     digits: int,
     reasons: Sequence[str] = (),
     stored: bool = False,
 ) -> Proof:
+    """Collect the numbers and verdicts of a design in a `Proof`; `reasons` say why it is not proved."""
     numbers = {
         n: number(ball, digits)
-        if n in (*found.moved, *design.tangents) or (known := design.values[n].fraction) is None
-        else fraction(known, digits)
-        for n, ball in found.parameters.items()
+        if n in (*proved_design.moved, *design.tangents) or (exact_value := design.values[n].fraction) is None
+        else fraction(exact_value, digits)
+        for n, ball in proved_design.parameters.items()
     }
-    abscissa = found.factorisation.abscissa
-    real = problem.model.carrier is None
-    hidden = () if real or pattern is None else pattern.unknowns  # those of the real double
-    hidden = (*hidden, *(f"{pattern.name}.{n}" for n in hidden)) if pattern else ()
-    roots = user_roots(problem.model, found.factorisation.roots or ())
-    geometric, defective = eigenvector_verdict(problem, design, found)
+    abscissa = proved_design.factorisation.abscissa
+    is_real = problem.model.carrier is None
+    hidden_unknowns = () if is_real or pattern is None else pattern.unknowns  # the unknowns of the real double of H
+    hidden_unknowns = (*hidden_unknowns, *(f"{pattern.name}.{n}" for n in hidden_unknowns)) if pattern else ()
+    roots = user_roots(problem.model, proved_design.factorisation.roots or ())
+    geometric, defective = eigenvector_verdict(problem, design, proved_design)
     if not reasons and geometric is not None and geometric > 1 and "EP" in name:
         reasons = [f"{'not an EP' if defective.holds else CROSSING}: {defective.words}"]
     return Proof(
@@ -319,39 +320,41 @@ def _assemble(
         proved=not reasons,
         reason=reasons[0] if reasons else "",
         pattern=name,
-        method=found.method,
+        method=proved_design.method,
         digits=digits,
         stored=stored,
         parameters=Table({n: numbers[n] for n in problem.parameter_set.names}),
-        tangents=Table({n: number(ball, digits) for n, ball in found.tangents.items()}),
-        unknowns=Table({n: number(ball, digits) for n, ball in found.unknowns.items() if n not in hidden}),
-        moved=found.moved,
-        held=Table(dict(design.text(n) for n in problem.parameter_set.names if n not in found.moved)),
+        tangents=Table({n: number(ball, digits) for n, ball in proved_design.tangents.items()}),
+        unknowns=Table(
+            {n: number(ball, digits) for n, ball in proved_design.unknowns.items() if n not in hidden_unknowns}
+        ),
+        moved=proved_design.moved,
+        held=Table(dict(design.text(n) for n in problem.parameter_set.names if n not in proved_design.moved)),
         stated=design.stated,
         numbers=_formula_numbers(problem),
-        radius=found.radius,
-        uniqueness=found.uniqueness,
-        distance=found.distance,
-        explained=found.explained,
+        radius=proved_design.radius,
+        uniqueness=proved_design.uniqueness,
+        distance=proved_design.distance,
+        explained=proved_design.explained,
         roots=tuple(ProvedRoot(number(z.re, digits), number(z.im, digits), z.multiplicity) for z in roots),
         eigenfrequencies=tuple(
-            ProvedRoot(number(-z.im, digits), number(z.re, digits), z.multiplicity) for z in (() if real else roots)
+            ProvedRoot(number(-z.im, digits), number(z.re, digits), z.multiplicity) for z in (() if is_real else roots)
         ),
         abscissa=None if abscissa is None else number(abscissa, digits),
         geometric_multiplicity=geometric,
         defective=defective,
-        stable=stability_verdict(found.factorisation, not real),
-        heavily_damped=heavy_damping_verdict(found.factorisation) if real else NOT_CHECKED,
-        inside=box_verdict(problem, design, found),
-        limits=Table(limit_verdicts(problem, found)),
+        stable=stability_verdict(proved_design.factorisation, not is_real),
+        heavily_damped=heavy_damping_verdict(proved_design.factorisation) if is_real else NOT_CHECKED,
+        inside=box_verdict(problem, design, proved_design),
+        limits=Table(limit_verdicts(problem, proved_design)),
     )
 
 
 def _formula_numbers(problem: Posed) -> tuple[str, ...]:
-    """Texts of the non-integers in formulas."""
+    """The numbers in formulas that are not integers, as texts."""
     constants = [x for c in problem.conditions.values() if c.equality for x in c.formula.constants]
-    equalities = [text for x in constants if not (text := number_text(x)).lstrip("-").isdigit()]
-    return tuple(dict.fromkeys([*problem.model.numbers, *equalities]))
+    texts = [text for x in constants if not (text := number_text(x)).lstrip("-").isdigit()]
+    return tuple(dict.fromkeys([*problem.model.numbers, *texts]))
 
 
 def _state_claim(name: str, pattern: Pattern | None) -> str:

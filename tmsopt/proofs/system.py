@@ -1,4 +1,4 @@
-"""The square system of a root pattern: a_k = a0 c_k, and the problem's equalities."""
+"""The square system of a root pattern: a_k = a0 c_k (c_k are the pattern's coefficients), and the == constraints."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,26 +18,26 @@ from tmsopt.records import Array
 from tmsopt.roots import Pattern
 
 ROUNDINGS = 64
-"""Roundings of each number by which a stored design may miss an equation."""
+"""A stored design may miss an equation by this many roundings of each number."""
 
-_MIN_PIVOT = 1e-9  # relative: a parameter that adds less to the others counts as dependent
-_ZERO = 1e-30  # of a range: the remainder that a solver leaves for 0
-_MIN_SCALE = 1e-3  # of a range: least scale of a parameter
+_MIN_PIVOT = 1e-9  # relative: a parameter with a smaller pivot depends on the others
+_ZERO_REMAINDER = 1e-30  # relative to a range: remainder that a solver leaves instead of 0
+_MIN_SCALE = 1e-3  # relative to a range: least scale of a parameter
 _EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class Equations:
-    """Left sides of the equations of a pattern and a problem.
+    """The equations of a pattern and a problem; a call computes their left sides.
 
-    Numbers have the names of parameters (angles stand for their tangents), of lifted quantities, and of unknowns of
-    the pattern, see `pattern_unknowns`.
+    The arguments have the names of parameters (the number for an angle is its tangent), of lifted quantities, and of
+    unknowns of the pattern (see `pattern_unknowns`).
 
     Attributes:
         equalities: the == constraints.
         lifted: quantities in them that are unknowns with an equation.
         unit: unit of the roots, a power of 2.
-        units: units of numbers that are not about 1, powers of 2.
+        units: units of the numbers whose size is not about 1, powers of 2.
     """
 
     problem: Posed
@@ -55,9 +55,9 @@ class Equations:
     @property
     def pattern_unknowns(self) -> tuple[str, ...]:
         """Names of the unknowns of the pattern, different from those of parameters and quantities."""
-        of = self.problem.parameter_set
-        taken = {*of.names, *self.problem.model.quantity_names(of)}
-        return tuple(f"{self.pattern.name}.{u}" if u in taken else u for u in self.pattern.unknowns)
+        parameter_set = self.problem.parameter_set
+        used_names = {*parameter_set.names, *self.problem.model.quantity_names(parameter_set)}
+        return tuple(f"{self.pattern.name}.{u}" if u in used_names else u for u in self.pattern.unknowns)
 
     @property
     def conditions(self) -> int:
@@ -65,32 +65,32 @@ class Equations:
         return self.pattern.codimension + len(self.equalities)
 
     def __call__(self, at: Mapping[str, Any]) -> list[Any]:
-        """The left sides."""
+        """Compute the left sides."""
         values = values_at(self.problem, self.lifted, at, {})
         u = [at[n] for n in self.pattern_unknowns]
         a = values.coefficients
-        left = [p - a[0] * c for p, c in zip(a[1:], self.pattern.monic(u)[1:], strict=True)]
+        left_sides = [p - a[0] * c for p, c in zip(a[1:], self.pattern.monic(u)[1:], strict=True)]
         if self.equalities:
             values = values.with_known({"abscissa": abscissa_formula(self.pattern, u)})
-        return left + extra_equations(values, self.lifted, self.equalities, at)
+        return left_sides + extra_equations(values, self.lifted, self.equalities, at)
 
 
 def build_equations(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> Equations:
-    """The equations of a pattern in a problem.
+    """Build the equations of a pattern in a problem.
 
     Raises:
-        ProofFailed: for an equality of a quantity that balls do not support.
+        ProofFailed: for an equality of a quantity that ball arithmetic does not support.
     """
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
     unsupported = [n for n in (RADIUS, "damping_ratio", ANGULAR_FREQUENCY) if any(n in c.names for c in equalities)]
     if unsupported:
         raise ProofFailed(f"a proof does not support == constraints on {unsupported[0]}; drop it to prove the rest")
     lifted = lifted_quantities(problem.model, problem.parameter_set, parameters, equalities)
-    own = Equations(problem, pattern, equalities, lifted, unit_near(scale_of(problem).unit))
+    system = Equations(problem, pattern, equalities, lifted, unit_near(scale_of(problem).unit))
     units = proof_units(problem)
-    units |= {q.name: unit_near(abs(float(problem.values(parameters)[q.name]))) for q in own.lifted}
-    units |= {n: own.unit**power for n, power in zip(own.pattern_unknowns, pattern.powers, strict=True)}
-    return replace(own, units=units)
+    units |= {q.name: unit_near(abs(float(problem.values(parameters)[q.name]))) for q in system.lifted}
+    units |= {n: system.unit**power for n, power in zip(system.pattern_unknowns, pattern.powers, strict=True)}
+    return replace(system, units=units)
 
 
 @dataclass(frozen=True)
@@ -98,69 +98,84 @@ class MovedParameters:
     """The parameters to solve for, and how well the equations determine them.
 
     Attributes:
-        explained: parameter or unknown → how far ROUNDINGS of each number may move it.
+        explained: parameter or unknown → how far the rounding of the stored numbers may move it.
     """
 
     moved: tuple[str, ...]
     explained: Mapping[str, float]
 
 
-def choose_moved(system: Equations, at: Mapping[str, Any], among: Sequence[str]) -> MovedParameters:
+def choose_moved(system: Equations, at: Mapping[str, Any], candidates: Sequence[str]) -> MovedParameters:
     """Choose the best conditioned free parameters by QR with column pivoting, after projecting out the unknowns.
 
     Raises:
         ProofFailed: if there are too few parameters, or the equations do not determine them.
     """
-    count, of = system.conditions, system.problem.parameter_set
-    if len(among) < count:
+    count, parameter_set = system.conditions, system.problem.parameter_set
+    if len(candidates) < count:
         raise ProofFailed(
-            f"{_count(count, 'condition')} and {_count(len(among), 'free parameter')}: the pattern could not be proved "
-            "for these numbers, which may be rounded, or irrational; "
-            f"free {count - len(among)} more, or give fractions that have the pattern"
+            f"{_count(count, 'condition')} and {_count(len(candidates), 'free parameter')}: the pattern could not be "
+            "proved for these numbers, which may be rounded, or irrational; "
+            f"free {count - len(candidates)} more, or give fractions that have the pattern"
         )
-    names = [*of.names, *system.unknowns]
+    names = [*parameter_set.names, *system.unknowns]
     jacobian = np.array([[float(e) for e in row] for row in jacobian_of(system, at, names).tolist()])
     values = np.array([abs(float(at[n])) for n in names])
     rounding = np.abs(jacobian) @ values + 1e-300
     widths = {n: _MIN_SCALE * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
     units = [system.units.get(n, 1.0) for n in names]
     scale = np.maximum(np.where(values > 0, values, units), [widths.get(n, 0.0) for n in names])
-    outside = [names.index(n) for n in system.unknowns]
-    free = [names.index(n) for n in among]
-    size = np.abs(jacobian)[:, [*free, *outside]] @ scale[[*free, *outside]] + 1e-300
-    scaled = jacobian / size[:, None] * scale
-    if not np.all(np.isfinite(scaled)):
+    unknown_columns = [names.index(n) for n in system.unknowns]
+    candidate_columns = [names.index(n) for n in candidates]
+    row_sizes = (
+        np.abs(jacobian)[:, [*candidate_columns, *unknown_columns]] @ scale[[*candidate_columns, *unknown_columns]]
+        + 1e-300
+    )
+    scaled_jacobian = jacobian / row_sizes[:, None] * scale
+    if not np.all(np.isfinite(scaled_jacobian)):
         raise ProofFailed(
             "the equations have no finite derivatives at the design; move it away from the end of its range"
         )
-    basis = np.linalg.qr(scaled[:, outside], mode="complete")[0][:, len(outside) :] if outside else np.eye(len(scaled))
-    reduced = basis.T @ scaled[:, free]
-    order, pivots = _pivot_columns(reduced, count)
+    basis = (
+        np.linalg.qr(scaled_jacobian[:, unknown_columns], mode="complete")[0][:, len(unknown_columns) :]
+        if unknown_columns
+        else np.eye(len(scaled_jacobian))
+    )
+    reduced_jacobian = basis.T @ scaled_jacobian[:, candidate_columns]
+    order, pivots = _pivot_columns(reduced_jacobian, count)
     if count and not pivots[-1] > _MIN_PIVOT * max(pivots[0], 1e-3):
-        idle = [n for n, k in zip(among, free, strict=True) if not np.any(jacobian[:, k])]
-        why = f"; they do not depend on {', '.join(idle)}" if idle else ""
+        idle_names = [n for n, k in zip(candidates, candidate_columns, strict=True) if not np.any(jacobian[:, k])]
+        reason = f"; they do not depend on {', '.join(idle_names)}" if idle_names else ""
         raise ProofFailed(
-            f"the equations are (nearly) singular in the free parameters {', '.join(among)}{why}; free another one"
+            f"the equations are (nearly) singular in the free parameters {', '.join(candidates)}{reason}; "
+            "free another one"
         )
-    moved = tuple(sorted((among[k] for k in order), key=of.names.index))
-    square = [names.index(n) for n in (*moved, *system.unknowns)]
-    effect = np.abs(np.linalg.pinv(scaled[:, square])) @ (rounding / size) * scale[square] * (ROUNDINGS * _EPS)
-    floors = {n: _ZERO * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
-    solved = zip((*moved, *system.unknowns), effect, strict=True)
-    return MovedParameters(moved, {n: float(e) + 2 * _EPS * abs(float(at[n])) + floors.get(n, 0.0) for n, e in solved})
+    moved_names = tuple(sorted((candidates[k] for k in order), key=parameter_set.names.index))
+    solved_columns = [names.index(n) for n in (*moved_names, *system.unknowns)]
+    rounding_effects = (
+        np.abs(np.linalg.pinv(scaled_jacobian[:, solved_columns]))
+        @ (rounding / row_sizes)
+        * scale[solved_columns]
+        * (ROUNDINGS * _EPS)
+    )
+    floors = {n: _ZERO_REMAINDER * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
+    solved = zip((*moved_names, *system.unknowns), rounding_effects, strict=True)
+    return MovedParameters(
+        moved_names, {n: float(e) + 2 * _EPS * abs(float(at[n])) + floors.get(n, 0.0) for n, e in solved}
+    )
 
 
 def _pivot_columns(columns: Array, count: int) -> tuple[list[int], list[float]]:
-    """Order and sizes of the pivots of QR with column pivoting; avoids loading SciPy."""
-    left, order, adds = columns, list[int](), list[float]()
+    """Compute order and sizes of the pivots of QR with column pivoting, without loading SciPy."""
+    residual, order, sizes = columns, list[int](), list[float]()
     for _ in range(count):
-        lengths = np.linalg.norm(left, axis=0)
+        lengths = np.linalg.norm(residual, axis=0)
         order.append(int(lengths.argmax()))
-        adds.append(float(lengths.max()))
-        unit = left[:, order[-1]] / (adds[-1] or 1.0)
-        left = left - np.outer(unit, unit @ left)
-        left[:, order] = 0.0
-    return order, adds
+        sizes.append(float(lengths.max()))
+        unit = residual[:, order[-1]] / (sizes[-1] or 1.0)
+        residual = residual - np.outer(unit, unit @ residual)
+        residual[:, order] = 0.0
+    return order, sizes
 
 
 def _count(count: int, noun: str) -> str:
