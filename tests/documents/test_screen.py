@@ -167,7 +167,7 @@ def test_a_design_on_the_axis_is_on_the_edge():
 def test_a_scale_is_refused_where_there_is_one():
     from click.testing import CliRunner
 
-    from tmsopt.cli import every as main
+    from tmsopt.cli import command_group as main
 
     ended = CliRunner().invoke(main, ["solve", "problems/benchmark.toml", "--wheelbase", "1 m"])
     assert ended.exit_code == 2

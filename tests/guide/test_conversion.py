@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 import tmsopt
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.guide import converted_file
 
 PROBLEMS = Path("problems")

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 import tmsopt
-from tmsopt.cli import every
+from tmsopt.cli import command_group
 from tmsopt.guide import STARTS, companions, example, examples, new_problem
 
 ROOT = Path(__file__).parents[2]
@@ -95,7 +95,7 @@ def test_what_a_file_refers_to_comes_with_it():
 
 def test_a_problem_that_names_a_bicycle_comes_with_all_of_them(tmp_path):
     file = tmp_path / "mine.toml"
-    said = CliRunner().invoke(every, ["example", "smallest_change", "--output", str(file)])
+    said = CliRunner().invoke(command_group, ["example", "smallest_change", "--output", str(file)])
     assert (said.exit_code, said.stderr.count("wrote")) == (0, 3)  # the file, the schema, the folder
     written, kept = ({p.name for p in (folder / "bicycles").iterdir()} for folder in (tmp_path, ROOT / "problems"))
     assert written == kept
@@ -103,6 +103,8 @@ def test_a_problem_that_names_a_bicycle_comes_with_all_of_them(tmp_path):
     mine = tmp_path / "bicycles/fisher.txt"
     mine.write_text("mine")
     (tmp_path / "bicycles/silver.txt").unlink()
-    assert CliRunner().invoke(every, ["example", "smallest_gains", "-o", str(tmp_path / "b.toml")]).exit_code == 0
+    assert (
+        CliRunner().invoke(command_group, ["example", "smallest_gains", "-o", str(tmp_path / "b.toml")]).exit_code == 0
+    )
     assert mine.read_text() == "mine"
     assert (tmp_path / "bicycles/silver.txt").exists()

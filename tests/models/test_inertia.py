@@ -10,7 +10,7 @@ from helpers.bicycles import BODIES, appendix
 
 import tmsopt
 from benchmarks.judges.whipple import largest_real_part
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.models import inertia_margin
 
 ROBOT = {

@@ -12,7 +12,7 @@ from matplotlib.mathtext import MathTextParser
 from scipy.optimize import differential_evolution
 
 import tmsopt
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.models import CONSTANTS, FUNCTIONS, TAKEN, Unfit, from_coefficients, from_matrices, latex
 from tmsopt.problem import ROOT_NAMES
 from tmsopt.studies import definition

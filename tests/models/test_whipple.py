@@ -16,7 +16,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.dynamics import find_crossings
 from tmsopt.models import MODELS, Values, canonical, copo, problem_text, spin, to_si, whipple
 from tmsopt.roots import exact_roots, quadratic_pencil

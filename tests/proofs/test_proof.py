@@ -17,7 +17,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.algebra import Number, ProofFailed, enclose_solution, number, refine_solution
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.documents import list_numbers
 from tmsopt.models import decimal
 from tmsopt.problem import Case

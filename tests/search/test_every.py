@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 import tmsopt
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.models import from_coefficients, from_matrices
 
 pytestmark = pytest.mark.slow

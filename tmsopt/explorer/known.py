@@ -1,4 +1,4 @@
-"""Designs worth going to: the optimum, an exceptional point of the box, the published benchmark."""
+"""Designs that a page offers: the optimum, an exceptional point, the published benchmark."""
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,21 +18,22 @@ from tmsopt.roots import Structure
 from tmsopt.search import solve
 
 _BENCHMARKS = {"tms": "benchmark", "whipple": "whipple_benchmark"}
-"""Models → the example with the published bicycle."""
+"""Model → name of the example with the published bicycle."""
 
-_STARTS, _ORDER = 2, 4  # of the search for an exceptional point, of which there need be none: starts, roots that meet
+_EP_STARTS = 2  # starts of the search for an exceptional point, which need not exist
+_MAX_EP_ORDER = 4  # largest number of roots that meet in it
 
 
 @dataclass(frozen=True)
 class Known:
-    """A design with a name, and the structure of its roots as the user reads them, multiple ones recognised.
+    """A design with a name, and with the structure of its roots in the user's units, multiple roots recognised.
 
     Attributes:
-        facts: what is known of it, a sentence each.
-        is_answer: whether it is what the problem asks for, or the nearest to it.
-        proved: what is proved of it, in one line; empty without a proof.
-        verdict: on its stability, with the power of t by which it grows, as in JSON; empty where nobody asked.
-        meetings: what meets in each multiple root.
+        facts: sentences about the design.
+        is_answer: whether the design solves the problem, or is the nearest to a solution.
+        proved: one line about its proof; empty without a proof.
+        verdict: verdict on its stability, with the power of t with which it grows, as in JSON; empty if not computed.
+        meetings: the roots that meet in each multiple root.
     """
 
     name: str
@@ -49,79 +50,83 @@ def known_designs(
     problem: Posed,
     solution: Solution | None,
     search: bool,
-    others: Sequence[tuple[str, Mapping[str, float]]] = (),
+    more_designs: Sequence[tuple[str, Mapping[str, float]]] = (),
 ) -> list[Known]:
-    """The designs that a page can go to, the one that it opens with first if a solution is given.
+    """The designs that a page offers; a given solution is the first one.
 
     Args:
-        search: whether to look for an exceptional point, unless the optimum is one or no design is stable.
-        others: names and parameters of designs that were found otherwise, which are answers too.
+        search: whether to search an exceptional point, unless the solution is one or is not stable.
+        more_designs: names and parameters of further designs that solve the problem.
     """
-    of = problem.nominal
-    named = [Known(name, values, _structure(problem, values), (), True) for name, values in others]
-    found = [*([] if solution is None else [_of_solution(solution)]), *named]
+    nominal = problem.nominal
+    more_known = [Known(name, values, _compute_structure(problem, values), (), True) for name, values in more_designs]
+    designs = [*([] if solution is None else [_describe_solution(solution)]), *more_known]
     if search and (solution is None or (solution.stable and "EP" not in solution.structure)):
-        found += _exceptional(problem)
+        designs += _find_exceptional_point(problem)
     return [
-        known
-        if known.meetings
-        else replace(known, meetings=meetings(of, known.parameters, of.values(known.parameters)["structure"].roots))
-        for known in [*found, *_benchmark(problem)]
+        design
+        if design.meetings
+        else replace(
+            design, meetings=meetings(nominal, design.parameters, nominal.values(design.parameters)["structure"].roots)
+        )
+        for design in [*designs, *_find_benchmark(problem)]
     ]
 
 
-def _of_solution(solution: Solution) -> Known:
-    """The solution, with how good it is known to be."""
+def _describe_solution(solution: Solution) -> Known:
+    """The solution with its status, verdict and proof."""
     problem = solution.problem.posed
     names = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
     words = describe_status(solution), describe_verdict(solution)
     facts, proof = [": ".join(filter(None, words)), *solution.notes], f"proof: {proof_line(solution)}"
-    proved = proof if solution.bound.proven else ""
+    proof_text = proof if solution.bound.proven else ""
     if problem.nominal is problem:
-        known = Structure(solution.structure, solution.roots, 0.0)
-    else:  # what is proved is proved of every case, and the page shows one
-        known, proved = _structure(problem, solution.parameters), ""
+        structure = Structure(solution.structure, solution.roots, 0.0)
+    else:  # the proof holds for all cases together, and the page shows one case
+        structure, proof_text = _compute_structure(problem, solution.parameters), ""
         facts[0] += " over every case of its bands and tolerances"
     name = names[solution.status] if problem.free else "as given"
     if problem.sense == "locate" and solution.status == "optimal":
         name = str(problem.locate)
-    said = solution.stability.to_json() if known.roots is solution.roots else {}
-    met = solution.meetings if said else ()
-    return Known(name, solution.parameters, known, (*facts, proof), True, proved, said, met)
+    verdict = solution.stability.to_json() if structure.roots is solution.roots else {}
+    root_meetings = solution.meetings if verdict else ()
+    return Known(name, solution.parameters, structure, (*facts, proof), True, proof_text, verdict, root_meetings)
 
 
-def _benchmark(problem: Posed) -> Iterator[Known]:
-    """The published bicycle of the problem's model in its own parameters, without a controller, if there is one."""
-    of = problem.parameter_set
+def _find_benchmark(problem: Posed) -> Iterator[Known]:
+    """The published bicycle for the model of a problem, if there is one, without a controller."""
+    parameter_set = problem.parameter_set
     if problem.model.name not in _BENCHMARKS:
         return
     try:
         text = example(_BENCHMARKS[problem.model.name])
     except InputError:  # an installation without the examples
         return
-    _, found = problem_from_tables(tomllib.loads(text), "")
-    assert found is not None
-    values = found.posed.values(found.fixed)
-    rest = {p.name: problem.fixed.get(p.name, 0.0) if p.default is None else p.default for p in of.parameters}
-    parameters = {n: float(values[n] if n in values else rest[n]) for n in of.names}
-    yield Known("benchmark", parameters, _structure(problem, parameters), (found.title,))
+    _, benchmark = problem_from_tables(tomllib.loads(text), "")
+    assert benchmark is not None
+    values = benchmark.posed.values(benchmark.fixed)
+    defaults = {
+        p.name: problem.fixed.get(p.name, 0.0) if p.default is None else p.default for p in parameter_set.parameters
+    }
+    parameters = {n: float(values[n] if n in values else defaults[n]) for n in parameter_set.names}
+    yield Known("benchmark", parameters, _compute_structure(problem, parameters), (benchmark.title,))
 
 
-def _exceptional(problem: Posed) -> Iterator[Known]:
-    """The highest exceptional point that the freedom of a problem allows, limits left aside, if one is found.
+def _find_exceptional_point(problem: Posed) -> Iterator[Known]:
+    """The exceptional point of the highest order that the free parameters allow, without constraints, if it is found.
 
-    A k-fold root takes k − 1 free parameters.
+    A k-fold root needs k − 1 free parameters.
     """
-    order = min(problem.model.degree, len(problem.free) + 1, _ORDER)
-    alone: dict[str, Any] = {"constraints": {}, "minimize": None, "maximize": None, "pareto": (), "start": {}}
-    asked = problem.nominal.derive(**alone, locate=f"EP{order}") if order > 1 else None
-    if asked is None or degrees_of_freedom(asked).count < 0:
+    order = min(problem.model.degree, len(problem.free) + 1, _MAX_EP_ORDER)
+    changes: dict[str, Any] = {"constraints": {}, "minimize": None, "maximize": None, "pareto": (), "start": {}}
+    ep_problem = problem.nominal.derive(**changes, locate=f"EP{order}") if order > 1 else None
+    if ep_problem is None or degrees_of_freedom(ep_problem).count < 0:
         return
-    found = solve(asked, throw=False, starts=_STARTS, stability=0.0, alone=False)
-    if found.status == "optimal" and "EP" in found.structure:
+    solution = solve(ep_problem, throw=False, starts=_EP_STARTS, stability=0.0, alone=False)
+    if solution.status == "optimal" and "EP" in solution.structure:
         facts = ("limits left aside",) if problem.constraints else ()
-        yield Known(found.structure, found.parameters, Structure(found.structure, found.roots, 0.0), facts)
+        yield Known(solution.structure, solution.parameters, Structure(solution.structure, solution.roots, 0.0), facts)
 
 
-def _structure(problem: Posed, parameters: Mapping[str, float]) -> Structure:
+def _compute_structure(problem: Posed, parameters: Mapping[str, float]) -> Structure:
     return user_structure(problem.model, problem.nominal.values(parameters)["structure"])
