@@ -50,7 +50,7 @@ class Crash:
 
 
 class EngineError(RuntimeError):
-    """The executor cannot continue. Results that it has yielded are valid; the other items can be submitted again."""
+    """The executor cannot continue. The results that it has yielded are valid; the other items can be sent again."""
 
 
 def ignore_note(line: str) -> None:

@@ -11,9 +11,9 @@ from os import PathLike
 from typing import Any, Unpack
 
 from tmsopt.errors import input_error
+from tmsopt.explorer.designs import PageDesign, list_designs
 from tmsopt.explorer.javascript import kernel_script, model_script
-from tmsopt.explorer.known import Known, known_designs
-from tmsopt.explorer.subject import subject
+from tmsopt.explorer.page_data import make_page_data
 from tmsopt.files import as_path, write_text
 from tmsopt.problem import Given, Posed, Problem, Solution, pose
 from tmsopt.problem.toml import read_page
@@ -101,7 +101,7 @@ def explore(problem: Given, **options: Unpack[CommonOptions]) -> Explorer:
         if posed.sense != "evaluate" or not posed.free:
             solution = solve(posed, throw=False, stability=0.0, **options)
     start_steps(listener, "looking for designs worth going to")
-    designs = known_designs(posed, solution, search=True)
+    designs = list_designs(posed, solution, search=True)
     start_steps(listener, "writing the page")
     html = _write_html(posed, designs, model if isinstance(model, dict) else {}, trace_curves=True)
     return Explorer(posed.problem, solution, html)
@@ -120,7 +120,7 @@ def page_of(
         trace_curves: whether to trace the boundaries of stability around the design with which the page opens.
     """
     problem, solution = pose(design), design if isinstance(design, Solution) else None
-    designs = known_designs(problem, solution, search=False, more_designs=more_designs)
+    designs = list_designs(problem, solution, search=False, more_designs=more_designs)
     return _write_html(problem, designs, {}, trace_curves)
 
 
@@ -135,10 +135,10 @@ def frame(html: str, title: str) -> str:
 # The page as one file: the parts that are the same in every page, and the formulas and data of one problem
 
 
-def _write_html(problem: Posed, designs: Sequence[Known], model: Mapping[str, Any], trace_curves: bool) -> str:
-    """The page of a problem; the arguments are those of `subject`."""
+def _write_html(problem: Posed, designs: Sequence[PageDesign], model: Mapping[str, Any], trace_curves: bool) -> str:
+    """The page of a problem; the arguments are those of `make_page_data`."""
     script = model_script(problem)
-    data = subject(problem, designs, script, model, trace_curves) | {"version": version("tmsopt")}
+    data = make_page_data(problem, designs, script, model, trace_curves) | {"version": version("tmsopt")}
     page_scripts = script.text, kernel_script(problem.model.degree), f"const DATA = {_format_json(data)};"
     parts = [*page_scripts, *(_read_minified(f"{name}.js") for name in _SCRIPT_NAMES.split())]
     marks = {

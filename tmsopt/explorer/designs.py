@@ -25,7 +25,7 @@ _MAX_EP_ORDER = 4  # largest number of roots that meet in it
 
 
 @dataclass(frozen=True)
-class Known:
+class PageDesign:
     """A design with a name, and with the structure of its roots in the user's units, multiple roots recognised.
 
     Attributes:
@@ -46,21 +46,23 @@ class Known:
     meetings: tuple[MultipleRoot, ...] = ()
 
 
-def known_designs(
+def list_designs(
     problem: Posed,
     solution: Solution | None,
     search: bool,
     more_designs: Sequence[tuple[str, Mapping[str, float]]] = (),
-) -> list[Known]:
+) -> list[PageDesign]:
     """The designs that a page offers; a given solution is the first one.
 
     Args:
-        search: whether to search an exceptional point, unless the solution is one or is not stable.
+        search: whether to search for an exceptional point, unless the solution is one or is not stable.
         more_designs: names and parameters of further designs that solve the problem.
     """
     nominal = problem.nominal
-    more_known = [Known(name, values, _compute_structure(problem, values), (), True) for name, values in more_designs]
-    designs = [*([] if solution is None else [_describe_solution(solution)]), *more_known]
+    further_designs = [
+        PageDesign(name, values, _compute_structure(problem, values), (), True) for name, values in more_designs
+    ]
+    designs = [*([] if solution is None else [_describe_solution(solution)]), *further_designs]
     if search and (solution is None or (solution.stable and "EP" not in solution.structure)):
         designs += _find_exceptional_point(problem)
     return [
@@ -73,7 +75,7 @@ def known_designs(
     ]
 
 
-def _describe_solution(solution: Solution) -> Known:
+def _describe_solution(solution: Solution) -> PageDesign:
     """The solution with its status, verdict and proof."""
     problem = solution.problem.posed
     names = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
@@ -90,10 +92,10 @@ def _describe_solution(solution: Solution) -> Known:
         name = str(problem.locate)
     verdict = solution.stability.to_json() if structure.roots is solution.roots else {}
     root_meetings = solution.meetings if verdict else ()
-    return Known(name, solution.parameters, structure, (*facts, proof), True, proof_text, verdict, root_meetings)
+    return PageDesign(name, solution.parameters, structure, (*facts, proof), True, proof_text, verdict, root_meetings)
 
 
-def _find_benchmark(problem: Posed) -> Iterator[Known]:
+def _find_benchmark(problem: Posed) -> Iterator[PageDesign]:
     """The published bicycle for the model of a problem, if there is one, without a controller."""
     parameter_set = problem.parameter_set
     if problem.model.name not in _BENCHMARKS:
@@ -109,10 +111,10 @@ def _find_benchmark(problem: Posed) -> Iterator[Known]:
         p.name: problem.fixed.get(p.name, 0.0) if p.default is None else p.default for p in parameter_set.parameters
     }
     parameters = {n: float(values[n] if n in values else defaults[n]) for n in parameter_set.names}
-    yield Known("benchmark", parameters, _compute_structure(problem, parameters), (benchmark.title,))
+    yield PageDesign("benchmark", parameters, _compute_structure(problem, parameters), (benchmark.title,))
 
 
-def _find_exceptional_point(problem: Posed) -> Iterator[Known]:
+def _find_exceptional_point(problem: Posed) -> Iterator[PageDesign]:
     """The exceptional point of the highest order that the free parameters allow, without constraints, if it is found.
 
     A k-fold root needs k − 1 free parameters.
@@ -125,7 +127,9 @@ def _find_exceptional_point(problem: Posed) -> Iterator[Known]:
     solution = solve(ep_problem, throw=False, starts=_EP_STARTS, stability=0.0, alone=False)
     if solution.status == "optimal" and "EP" in solution.structure:
         facts = ("limits left aside",) if problem.constraints else ()
-        yield Known(solution.structure, solution.parameters, Structure(solution.structure, solution.roots, 0.0), facts)
+        yield PageDesign(
+            solution.structure, solution.parameters, Structure(solution.structure, solution.roots, 0.0), facts
+        )
 
 
 def _compute_structure(problem: Posed, parameters: Mapping[str, float]) -> Structure:

@@ -10,8 +10,8 @@ import numpy as np
 
 from tmsopt.analysis import structure_line
 from tmsopt.evaluation.recheck import FEASIBLE
+from tmsopt.explorer.designs import PageDesign
 from tmsopt.explorer.javascript import Script, is_bicycle
-from tmsopt.explorer.known import Known
 from tmsopt.guide import exact_value, toml_key, toml_text
 from tmsopt.models import Parameter, words_of
 from tmsopt.models.user_spectrum import ON_AXIS, eigenfrequencies
@@ -33,8 +33,8 @@ _SHARED_PART = re.compile(r"\[(\d+)\]")  # reference to a part of a model that s
 _MIDDLE_NOTE = "nothing was solved here, so the page opens in the middle of the box"
 
 
-def subject(
-    problem: Posed, designs: Sequence[Known], script: Script, model: Mapping[str, Any], trace_curves: bool
+def make_page_data(
+    problem: Posed, designs: Sequence[PageDesign], script: Script, model: Mapping[str, Any], trace_curves: bool
 ) -> dict[str, Any]:
     """The data of a page; numbers are in rad and SI units.
 
@@ -130,7 +130,7 @@ def _describe_constraint(problem: Posed, name: str) -> dict[str, Any]:
     }
 
 
-def _describe_design(problem: Posed, design: Known) -> dict[str, Any]:
+def _describe_design(problem: Posed, design: PageDesign) -> dict[str, Any]:
     structure = design.structure
     # Growth rate, frequency and multiplicity of each root, for one root of a conjugate pair. For a complex matrix H of
     # eigenfrequencies ω: Im ω, Re ω and multiplicity.
