@@ -314,9 +314,9 @@ def test_files_are_written_whole():
         "tmsopt.documents.html._save_image",
         "tmsopt.plots.style.render",  # in memory
         "tmsopt.killable.serve",  # a pipe
-        "tmsopt.studies.export._csv",
-        "tmsopt.studies.export._netcdf",
-        "tmsopt.studies.export._parquet",  # by `export`
+        "tmsopt.studies.export._write_csv",
+        "tmsopt.studies.export._write_netcdf",
+        "tmsopt.studies.export._write_parquet",  # by `export`
     }
 
 
@@ -342,7 +342,10 @@ def test_import_and_help_are_light(heavy, modules_loaded):
 
 @pytest.fixture(
     scope="module",
-    params=["import tmsopt", "from tmsopt.cli.commands import every; every(['--help'], standalone_mode=False)"],
+    params=[
+        "import tmsopt",
+        "from tmsopt.cli.commands import command_group; command_group(['--help'], standalone_mode=False)",
+    ],
 )
 def modules_loaded(request):
     script = f"{request.param}; import sys; print(*sys.modules, file=sys.stderr)"
@@ -355,7 +358,7 @@ def modules_loaded(request):
 def test_everyday_commands_load_what_they_need_alone(command):
     """Half a second: pint reads unusual units, SciPy decides what few problems ask, branch and bound what is not known."""
     words = [command, "problems/ep4.toml"]
-    script = f"from tmsopt.cli.commands import every; every({words!r}, standalone_mode=False)"
+    script = f"from tmsopt.cli.commands import command_group; command_group({words!r}, standalone_mode=False)"
     loaded = f"import sys\ntry:\n    {script}\nfinally:\n    print(*sys.modules, file=sys.stderr)"
     ended = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, cwd=ROOT, check=False)
     modules = set(ended.stderr.split())

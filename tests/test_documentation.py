@@ -95,7 +95,7 @@ def test_pictures_are_small():
 
 def test_every_command_is_documented():
     rows = re.findall(r"^\| `tmsopt (\w+)", (ROOT / "docs" / "reference" / "commands.md").read_text(), re.MULTILINE)
-    assert set(rows) == set(import_module("tmsopt.cli.commands").every.commands)
+    assert set(rows) == set(import_module("tmsopt.cli.commands").command_group.commands)
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if p.name != "CHANGELOG.md"], ids=lambda p: p.name)
@@ -113,7 +113,7 @@ def test_public_names_exist(page):
 
 def test_options_exist():
     """What a page calls `--something` is an option of a command, or of the benchmarks."""
-    commands = import_module("tmsopt.cli.commands").every
+    commands = import_module("tmsopt.cli.commands").command_group
     options = {
         word for c in (commands, *commands.commands.values()) for p in c.params for word in (*p.opts, *p.secondary_opts)
     }

@@ -9,7 +9,7 @@ import pytest
 
 import tmsopt
 from tmsopt.progress import start_steps
-from tmsopt.studies import plan_study
+from tmsopt.studies import prepare_study
 
 PLANE = tmsopt.load("problems/chart.toml")
 EP4 = tmsopt.load("problems/ep4.toml")
@@ -40,7 +40,7 @@ VERBS = [
     ("following the front", partial(tmsopt.pareto, "problems/pareto.toml", points=2)),
     ("solving rows", partial(tmsopt.run_study, STUDY)),
     ("solving rows", partial(tmsopt.run_study, DRAWN)),
-    ("searching", partial(plan_study, DRAWN)),
+    ("searching", partial(prepare_study, DRAWN)),
     ("drawing designs", lambda **told: tmsopt.monte_carlo(optimum(), 20, tolerances={"mu": 0.01}, **told)),
     ("moving limits", partial(tmsopt.explain, "problems/realistic.toml")),
     ("judging the optimum", lambda **told: tmsopt.optimality(optimum(), **told)),

@@ -1,7 +1,7 @@
 """Executors call a function for many items: in this process, in processes of this machine or on a Dask cluster.
 
 An item that ends its worker yields a `Crash`, and no other item is lost. The workers end at once when the iterator is
-closed, on Ctrl-C, and with this process, even by kill -9.
+closed, on Ctrl-C, and when this process ends, even by kill -9.
 """
 
 import asyncio
@@ -24,17 +24,17 @@ from tmsopt.errors import input_error
 from tmsopt.killable import Killable, ProcessEnded
 
 PATIENCE = 10.0
-"""Time limit in s for an answer of a Dask scheduler."""
+"""Longest time in s to wait for an answer of a Dask scheduler."""
 
 Note = Callable[[str], None]
 """A callback for one line about workers that join, leave or crash."""
 
-_BATCH = 0.2  # s of work in one batch
-_RECENT = 64  # batches whose mean time per item predicts the next ones
-_AHEAD = 2  # batches in flight per worker: it computes one while the next travels
-_CHECK = 1.0  # s between checks of the workers; some systems ignore Ctrl-C during a wait
-_TRIES = 2  # crashes of an item, alone in flight, before it is given up
-_WORKER = "'dask worker ADDRESS --nthreads 1'"
+_BATCH_SECONDS = 0.2  # a batch of items should take this time in s
+_RECENT_BATCHES = 64  # the mean time per item of so many batches predicts that of the next one
+_BATCHES_PER_WORKER = 2  # batches in flight, which are sent but not answered: a worker computes one, the next is sent
+_CHECK_SECONDS = 1.0  # time between checks of the workers; some systems ignore Ctrl-C during a wait
+_MAX_CRASHES = 2  # an item is given up after so many crashes while no other item was in flight
+_WORKER_COMMAND = "'dask worker ADDRESS --nthreads 1'"
 _START_TRIES = 3  # attempts to start a process that ends at once
 
 
@@ -43,14 +43,14 @@ class Crash:
     """The result of an item that ended its workers.
 
     Attributes:
-        cause: e.g. ``signal 9``; empty if unknown.
+        cause: why the worker ended, such as ``signal 9``; empty if unknown.
     """
 
     cause: str
 
 
 class EngineError(RuntimeError):
-    """The executor cannot continue. Results that it has yielded are valid; the other items can be submitted again."""
+    """The executor cannot continue. The results that it has yielded are valid; the other items can be sent again."""
 
 
 def ignore_note(line: str) -> None:
@@ -77,11 +77,11 @@ class Executor:
     def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
         """Yield the index of each item with its result or `Crash`, in the order in which they finish.
 
-        Batches of items are sent to the workers. When one ends, each batch in flight is tried again with nothing else
-        in flight, then its items one by one.
+        Batches of items are sent to the workers. If a worker ends, each batch that is not answered is sent again alone;
+        if a worker ends again, the items of this batch are sent one by one.
 
         Raises:
-            Exception: any that the function raises.
+            Exception: any exception that the function raises.
             EngineError: if the workers cannot continue.
         """
         if self._pool is None:
@@ -89,7 +89,7 @@ class Executor:
             return
         try:
             yield from self._results(self._pool, function, list(items))
-        except BaseException:  # interrupted, closed or failed: nobody reads the rest
+        except BaseException:  # the iterator was interrupted or closed, or failed: no more results are read
             self._pool.end()
             raise
 
@@ -100,66 +100,66 @@ class Executor:
 
         blob, inbox = cloudpickle.dumps(function), SimpleQueue[Any]()
         in_flight, suspects, crashes = dict[Any, Sequence[int]](), deque[Sequence[int]](), Counter[int]()
-        recent, first, is_alone = deque[float](maxlen=_RECENT), 0, False
+        recent_times, next_item, is_alone = deque[float](maxlen=_RECENT_BATCHES), 0, False
 
         def send(batch: Sequence[int]) -> None:
             future = pool.submit(blob, cloudpickle.dumps([items[place] for place in batch]))
             in_flight[future] = batch
             future.add_done_callback(inbox.put)
 
-        while in_flight or suspects or first < len(items):
+        while in_flight or suspects or next_item < len(items):
             if suspects and not in_flight:
                 is_alone = True
                 send(suspects.popleft())
-            while not (suspects or is_alone) and first < len(items):
-                most = _AHEAD * max(1, pool.workers)
-                if len(in_flight) >= most:
+            while not (suspects or is_alone) and next_item < len(items):
+                max_batches = _BATCHES_PER_WORKER * max(1, pool.workers)
+                if len(in_flight) >= max_batches:
                     break
-                size = _batch_size(recent, (len(items) - first) // most)
-                send(range(first, first + size))
-                first += size
+                size = _batch_size(recent_times, (len(items) - next_item) // max_batches)
+                send(range(next_item, next_item + size))
+                next_item += size
             try:
-                future = inbox.get(timeout=_CHECK)
+                future = inbox.get(timeout=_CHECK_SECONDS)
             except Empty:
-                pool.look()
+                pool.check_workers()
                 continue
             batch, was_alone, is_alone = in_flight.pop(future), is_alone, False
             try:
                 results, seconds, error = pickle.loads(pool.result(future))
-            except _Died as died:
-                cause, given_up = str(died), False
+            except _WorkerEnded as worker_end:
+                cause, is_given_up = str(worker_end), False
                 if not was_alone:
                     suspects.append(batch)
                 elif len(batch) == 1:
                     crashes.update(batch)
-                    given_up = crashes[batch[0]] == _TRIES
-                if was_alone and not given_up:
+                    is_given_up = crashes[batch[0]] == _MAX_CRASHES
+                if was_alone and not is_given_up:
                     suspects.extendleft((place,) for place in reversed(batch))
-                action = "given up" if given_up else "tried again, alone"
+                action = "given up" if is_given_up else "tried again, alone"
                 self._note(f"worker died{f' ({cause})' if cause else ''}; its item is {action}")
-                if given_up:
+                if is_given_up:
                     yield batch[0], Crash(cause)
                 continue
-            yield from zip(batch, results, strict=False)  # fewer results where one item raised
+            yield from zip(batch, results, strict=False)  # fewer results if one item raised an exception
             if error is not None:
                 raise error
-            recent.append(seconds / len(batch))
+            recent_times.append(seconds / len(batch))
 
 
 def cores() -> int:
-    """Number of usable cores, within affinity, quotas and LOKY_MAX_CPU_COUNT."""
+    """Number of cores that this process may use, by its affinity, quotas and LOKY_MAX_CPU_COUNT."""
     import loky
 
     return int(loky.cpu_count())
 
 
 def here() -> Executor:
-    """A loop in this process, which a crash ends."""
+    """An executor that calls the function in this process; a crash ends the process."""
     return Executor("in process")
 
 
 def processes(workers: int, note: Note = ignore_note) -> Executor:
-    """Processes of this machine, with one thread each.
+    """An executor with processes of this machine, each with one thread.
 
     Raises:
         InputError: if `workers` is less than 1.
@@ -171,23 +171,23 @@ def processes(workers: int, note: Note = ignore_note) -> Executor:
 
 
 def cluster(address: str, note: Note = ignore_note) -> Executor:
-    """The workers of the Dask scheduler at an address. They may join and leave; without any, items wait.
+    """An executor with the workers of a Dask scheduler. Workers may join and leave; if there is none, items wait.
 
     Raises:
-        InputError: if `distributed` is not installed, no scheduler answers, or a worker has several threads or no
-            tmsopt.
+        InputError: if `distributed` is not installed, no scheduler answers, a worker has several threads, or tmsopt is
+            not installed there.
     """
     return Executor(address, _DaskPool(address, note), note)
 
 
-class _Died(Exception):
-    """A worker ended while it had a call; its argument is the cause."""
+class _WorkerEnded(Exception):
+    """A worker ended during a call; the argument of this exception is the cause."""
 
 
-def _batch_size(recent: Sequence[float], most: int) -> int:
-    """Number of items for `_BATCH` seconds at the recent rate; few near the end, so that all workers end together."""
-    wanted = math.ceil(_BATCH * len(recent) / max(sum(recent), 1e-9))
-    return max(1, min(wanted, 2 * len(recent), most))
+def _batch_size(recent_times: Sequence[float], max_items: int) -> int:
+    """Number of items for `_BATCH_SECONDS` at the recent rate; small near the end, so that all workers end together."""
+    size = math.ceil(_BATCH_SECONDS * len(recent_times) / max(sum(recent_times), 1e-9))
+    return max(1, min(size, 2 * len(recent_times), max_items))
 
 
 # In a worker
@@ -195,7 +195,7 @@ def _batch_size(recent: Sequence[float], most: int) -> int:
 
 @lru_cache(maxsize=4)
 def _load(blob: bytes) -> Callable[[Any], Any]:
-    """Unpickle a function once, so that it keeps its caches."""
+    """Unpickle a function, once for all its calls, so that it keeps its caches."""
     try:
         function: Callable[[Any], Any] = pickle.loads(blob)
     except Exception as error:
@@ -204,16 +204,16 @@ def _load(blob: bytes) -> Callable[[Any], Any]:
 
 
 def _call(blob: bytes, items: bytes) -> bytes:
-    """Pickled results of items, their time in s, and the exception that ended them, if any."""
+    """Pickled results of items, their time in s, and the exception that ended the batch, or None."""
     import cloudpickle
 
-    results, error, began = list[Any](), None, time.perf_counter()
+    results, error, start_time = list[Any](), None, time.perf_counter()
     try:
         function = _load(blob)
         results.extend(map(function, pickle.loads(items)))
-    except Exception as raised:
-        error = raised
-    pickled: bytes = cloudpickle.dumps((results, time.perf_counter() - began, error))
+    except Exception as exception:
+        error = exception
+    pickled: bytes = cloudpickle.dumps((results, time.perf_counter() - start_time, error))
     return pickled
 
 
@@ -221,10 +221,11 @@ def _call(blob: bytes, items: bytes) -> bytes:
 
 
 class _ProcessPool:
-    """Processes that threads of this one talk to, one each; a process that ends is replaced.
+    """Processes of this machine; for each, a thread of this process sends calls. A process that ends is replaced.
 
-    `submit` gives the future of a call in a worker; `result` its result or exception, or `_Died` if its worker ended;
-    `look` checks the workers about once a second, and `end` ends all calls and workers. `workers` is their number.
+    `submit` gives the future of a call in a worker. `result` gives its result, or raises its exception or
+    `_WorkerEnded`. `check_workers` is called about once a second, and `end` ends all calls and workers. `workers` is
+    the number of workers.
     """
 
     def __init__(self, workers: int) -> None:
@@ -239,7 +240,7 @@ class _ProcessPool:
     def result(self, future: Any) -> Any:
         return future.result()
 
-    def look(self) -> None: ...
+    def check_workers(self) -> None: ...
 
     def end(self) -> None:
         with self._lock:
@@ -258,17 +259,17 @@ class _ProcessPool:
         try:
             answer = process.answer(_call, *call)
         except ProcessEnded as error:
-            raise _Died(process.end()) from error
+            raise _WorkerEnded(process.end()) from error
         self._idle.append(process)
         return answer
 
     def _start(self) -> Killable:
-        """A process that has answered."""
+        """Start a process, and wait for its first answer."""
         cause = ""
         for _ in range(_START_TRIES):
             with self._lock:
-                if self._threads is None:  # nobody waits for the answer
-                    raise _Died(cause)
+                if self._threads is None:  # the pool has ended
+                    raise _WorkerEnded(cause)
                 process = Killable()
                 self._running.append(process)
             try:
@@ -283,7 +284,7 @@ class _ProcessPool:
 
 
 class _DaskPool:
-    """A client of a Dask scheduler, which itself repeats the calls of a worker that ended."""
+    """A client of a Dask scheduler; the scheduler repeats the calls of a worker that ended."""
 
     def __init__(self, address: str, note: Note) -> None:
         self._address, self._note = address, note
@@ -292,7 +293,7 @@ class _DaskPool:
         self.workers, self._last_check = -1, 0.0
 
     def submit(self, *call: Any) -> Any:
-        self.look()
+        self.check_workers()
         return self._client.submit(_call, *call, pure=False)
 
     def result(self, future: Any) -> Any:
@@ -301,25 +302,25 @@ class _DaskPool:
         try:
             return future.result()
         except KilledWorker as error:
-            raise _Died("") from error
+            raise _WorkerEnded("") from error
         except (CancelledError, OSError) as error:
             raise self._lost_error() from error
 
-    def look(self) -> None:
+    def check_workers(self) -> None:
         now, self._client = time.monotonic(), self._client or _connect(self._address)
         if self._client.status != "running":
             raise self._lost_error()
-        if now - self._last_check < _CHECK:
+        if now - self._last_check < _CHECK_SECONDS:
             return
         self._last_check = now
         try:
             threads = self._client.nthreads()
         except OSError as error:
             raise self._lost_error() from error
-        wrong = [f"{place} has {count}" for place, count in threads.items() if count != 1]
-        if wrong:
-            reason = f"workers need one thread each, two in one IPOPT crash the process; {', '.join(wrong)}"
-            raise input_error(f"{reason}: start every worker with {_WORKER}", "scheduler")
+        bad_workers = [f"{place} has {count}" for place, count in threads.items() if count != 1]
+        if bad_workers:
+            reason = f"workers need one thread each, two in one IPOPT crash the process; {', '.join(bad_workers)}"
+            raise input_error(f"{reason}: start every worker with {_WORKER_COMMAND}", "scheduler")
         for place in threads.keys() - self._checked:
             _check_tmsopt(self._client, place)
         self._checked = frozenset(threads)
@@ -330,7 +331,7 @@ class _DaskPool:
     def end(self) -> None:
         client, self._client = self._client, None
         if client is not None:
-            with suppress(Exception):  # the scheduler may be gone; if not, it drops calls not yet started
+            with suppress(Exception):  # the scheduler may have ended; if not, it drops calls that have not begun
                 client.close(timeout=PATIENCE)
 
     def _lost_error(self) -> EngineError:
@@ -342,7 +343,7 @@ class _DaskPool:
 def _connect(address: str) -> Any:
     """A client of the scheduler at an address.
 
-    The address is probed first, because a `Client` that cannot connect retries and logs for long.
+    The address is checked first, because a `Client` that cannot connect tries again and logs for a long time.
     """
     try:
         distributed: Any = import_module("distributed")
@@ -357,7 +358,8 @@ def _connect(address: str) -> Any:
         reason = str(error) or type(error).__name__
     if reason:
         advice = "start one with 'dask scheduler', which prints its address, tcp://HOST:8786, and workers with"
-        raise input_error(f"no Dask scheduler answers at '{address}' ({reason}); {advice} {_WORKER}", "scheduler")
+        message = f"no Dask scheduler answers at '{address}' ({reason}); {advice} {_WORKER_COMMAND}"
+        raise input_error(message, "scheduler")
     return distributed.Client(address, timeout=PATIENCE, set_as_default=False)
 
 

@@ -21,16 +21,16 @@ from typing import Any, BinaryIO
 from tmsopt.errors import Fault, InputError, nearest, short
 
 LARGEST = 500_000
-"""Most bytes of a problem file."""
+"""Largest number of bytes of a problem file."""
 
 LARGEST_JSON = 24_000_000
-"""Most characters of a JSON text, some 1 200 000 numbers."""
+"""Largest number of characters of a JSON text; it has some 1 200 000 numbers."""
 
-_DEEPEST, _MARKS = 100, 1_000_000  # most levels of JSON; most lists, tables, texts and keys
-_WIDTH = 80  # most characters of a value in a message
+_MAX_DEPTH, _MAX_ITEMS = 100, 1_000_000  # levels of JSON; lists, tables, texts and keys together
+_MAX_WIDTH = 80  # characters of a value in a message
 _UNDECODED = re.compile("[\udc80-\udcff]")
-_NEAR = 3  # close names that a message offers
-_NEIGHBOURS = 1000  # most files of a folder compared with a misspelled name
+_MAX_SUGGESTIONS = 3  # similar names that a message suggests
+_MAX_COMPARED = 1000  # files of a folder that are compared with a misspelled name
 
 
 @contextmanager
@@ -40,28 +40,29 @@ def write_atomic(path: Path, *, locked: bool = False) -> Iterator[Path]:
     A device or a pipe receives the finished contents.
 
     Args:
-        locked: no other process writes `path`: the temporary name is fixed, and leftovers are deleted.
+        locked: whether the caller ensures that no other process writes `path`. Then the temporary name is fixed, and an
+            old temporary file is deleted.
 
     Raises:
-        OSError: naming `path`, if it cannot be written.
+        OSError: with the name `path`, if it cannot be written.
     """
     try:
         try:
             target = path.resolve()
         except RuntimeError as error:  # links in a circle
             raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from error
-        special = target.exists() and not (target.is_file() or target.is_dir())
+        is_special = target.exists() and not (target.is_file() or target.is_dir())
         if locked:
             temporary = target.with_name(f".{target.name}.unfinished")
             _remove(temporary)
         else:  # the caller may replace this file by a folder
-            folder = None if special else target.parent
+            folder = None if is_special else target.parent
             handle, name = tempfile.mkstemp(dir=folder, prefix=".tmsopt-", suffix=target.suffix)
             os.close(handle)
             temporary = Path(name)
         try:
             yield temporary
-            if special:
+            if is_special:
                 target.write_bytes(temporary.read_bytes())
                 return
             if not locked:  # temporary files are private to their owner
@@ -71,7 +72,7 @@ def write_atomic(path: Path, *, locked: bool = False) -> Iterator[Path]:
             os.replace(temporary, target)
         finally:
             _remove(temporary)
-    except OSError as error:  # it may name no file, or the temporary one
+    except OSError as error:  # the error may have no file name, or the temporary one
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
 
 
@@ -95,7 +96,7 @@ def move_aside(path: Path, companions: tuple[str, ...] = ()) -> Path:
     """Move a file or folder to ``name.1.ending``, or the first free number, and return its new path.
 
     Args:
-        companions: suffixes after the whole name, for files that move with it if they exist.
+        companions: suffixes that follow the whole name; files with these names are moved too, if they exist.
 
     Raises:
         OSError: if it cannot be moved, e.g. while a program reads it on Windows.
@@ -110,37 +111,39 @@ def move_aside(path: Path, companions: tuple[str, ...] = ()) -> Path:
 
 
 def list_differences(
-    known: Any, asked: Any, sides: tuple[str, str] = ("there", "asked for"), key: str = ""
+    old: Any, new: Any, sides: tuple[str, str] = ("there", "asked for"), key: str = ""
 ) -> Iterator[str]:
     """One phrase for each difference between two pieces of plain data; numbers are compared as doubles, bit by bit.
 
     Args:
-        known, asked: JSON data, with columns as ``array("d")``.
-        sides: words that follow a value of `known` and of `asked`.
+        old, new: JSON data, with columns as ``array("d")``.
+        sides: words that follow a value of `old` and of `new`.
     """
-    there, here = sides
-    match known, asked:
+    old_words, new_words = sides
+    match old, new:
         case Mapping(), Mapping():
-            for name in dict.fromkeys((*known, *asked)):
+            for name in dict.fromkeys((*old, *new)):
                 inner = f"{key}.{name}" if key else str(name)
-                if name in known and name in asked:
-                    yield from list_differences(known[name], asked[name], sides, inner)
+                if name in old and name in new:
+                    yield from list_differences(old[name], new[name], sides, inner)
                 else:
-                    one, other = (_format_value(side[name]) if name in side else "none" for side in (known, asked))
-                    yield f"{inner}: {one} {there}, {other} {here}"
+                    old_value, new_value = (
+                        _format_value(side[name]) if name in side else "none" for side in (old, new)
+                    )
+                    yield f"{inner}: {old_value} {old_words}, {new_value} {new_words}"
         case array(), array():
-            if len(known) != len(asked):
-                yield f"{key}: {len(known)} values {there}, {len(asked)} {here}"
-            pairs = [] if known.tobytes() == asked.tobytes() else list(zip(known, asked, strict=False))
-            if differ := [row for row, pair in enumerate(pairs) if not _is_same(*pair)]:
-                one, other = pairs[differ[0]]
-                values = f"{one!r} {there}, {other!r} {here}"
-                yield f"{key}: {len(differ)} of {len(pairs)} values differ, the first in row {differ[0]}: {values}"
-        case list(), list() if len(known) == len(asked):
-            for index, (one, other) in enumerate(zip(known, asked, strict=True)):
-                yield from list_differences(one, other, sides, f"{key}[{index}]")
-        case _ if not _is_same(known, asked):
-            yield f"{key}: {_format_value(known)} {there}, {_format_value(asked)} {here}"
+            if len(old) != len(new):
+                yield f"{key}: {len(old)} values {old_words}, {len(new)} {new_words}"
+            pairs = [] if old.tobytes() == new.tobytes() else list(zip(old, new, strict=False))
+            if rows := [row for row, pair in enumerate(pairs) if not _is_same(*pair)]:
+                old_value, new_value = pairs[rows[0]]
+                values = f"{old_value!r} {old_words}, {new_value!r} {new_words}"
+                yield f"{key}: {len(rows)} of {len(pairs)} values differ, the first in row {rows[0]}: {values}"
+        case list(), list() if len(old) == len(new):
+            for index, (old_value, new_value) in enumerate(zip(old, new, strict=True)):
+                yield from list_differences(old_value, new_value, sides, f"{key}[{index}]")
+        case _ if not _is_same(old, new):
+            yield f"{key}: {_format_value(old)} {old_words}, {_format_value(new)} {new_words}"
 
 
 def _is_same(a: Any, b: Any) -> bool:
@@ -154,14 +157,14 @@ def _format_value(value: Any) -> str:
     if isinstance(value, array):
         return f"{len(value)} values"
     text = json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= _WIDTH else f"{text[: _WIDTH - 1]}…"
+    return text if len(text) <= _MAX_WIDTH else f"{text[: _MAX_WIDTH - 1]}…"
 
 
 def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
     """The text of a UTF-8 file, without a byte order mark.
 
     Args:
-        kind: kind of file for messages, such as ``TOML problem file``; its first word is the format.
+        kind: kind of file for messages, such as ``TOML problem file``; the first word is the format.
 
     Raises:
         InputError: if the file is missing, irregular, too long or not UTF-8.
@@ -170,10 +173,10 @@ def read_text(file: str, kind: str, largest: int = LARGEST) -> str:
 
 
 def read_lines(file: str, kind: str, largest: int, longest: int) -> Generator[str]:
-    """Yield the lines of a UTF-8 file, line ends included, of up to `longest` characters each.
+    """Yield the lines of a UTF-8 file with their line ends; a line may have up to `longest` characters.
 
     Raises:
-        InputError: as `read_text`, at the line at fault.
+        InputError: like `read_text`, with the number of the line.
     """
     with _open(file, kind, largest) as stream:
         text = io.TextIOWrapper(stream, encoding="utf-8-sig", errors="surrogateescape", newline="")
@@ -181,8 +184,8 @@ def read_lines(file: str, kind: str, largest: int, longest: int) -> Generator[st
             message = ""
             if len(line) > longest:
                 message = f"the line is longer than {longest} characters; accepted: lines of up to {longest}"
-            elif not line.isascii() and (wrong := _UNDECODED.search(line)):
-                message = f"not {kind.split(maxsplit=1)[0]}: byte {ord(wrong[0]) - 0xDC00:#x} is not UTF-8"
+            elif not line.isascii() and (byte := _UNDECODED.search(line)):
+                message = f"not {kind.split(maxsplit=1)[0]}: byte {ord(byte[0]) - 0xDC00:#x} is not UTF-8"
             if message:
                 raise InputError([Fault(message, file=file, line=number)])
             yield line
@@ -190,11 +193,11 @@ def read_lines(file: str, kind: str, largest: int, longest: int) -> Generator[st
 
 @contextmanager
 def _open(file: str, kind: str, largest: int) -> Iterator[BinaryIO]:
-    """Open a regular file of up to `largest` bytes; a pipe or a device might never end."""
+    """Open a regular file of up to `largest` bytes; a pipe or a device is refused, because it might never end."""
     path = Path(file)
     try:
-        if wrong := _path_fault(path, kind, largest):
-            raise InputError([Fault(wrong, file=file)])
+        if fault := _path_fault(path, kind, largest):
+            raise InputError([Fault(fault, file=file)])
         with path.open("rb") as stream:
             yield stream
     except InputError:
@@ -208,50 +211,50 @@ def _path_fault(path: Path, kind: str, largest: int) -> str:
     if path.is_file():
         return f"is larger than {largest} bytes; accepted: a {kind} of less" if path.stat().st_size > largest else ""
     if os.path.lexists(path):
-        found = "a directory" if path.is_dir() else "not a regular file" if path.exists() else "a link to no file"
-        return f"is {found}; accepted: a {kind}"
-    others = path.parent.glob(f"*.{kind.split(maxsplit=1)[0].lower()}") if path.parent.is_dir() else ()
-    near = nearest(path.name, sorted(p.name for p in islice(others, _NEIGHBOURS)), most=_NEAR)
-    return f"no such file; did you mean {' or '.join(map(repr, near))}?" if near else "no such file"
+        kind_found = "a directory" if path.is_dir() else "not a regular file" if path.exists() else "a link to no file"
+        return f"is {kind_found}; accepted: a {kind}"
+    candidates = path.parent.glob(f"*.{kind.split(maxsplit=1)[0].lower()}") if path.parent.is_dir() else ()
+    names = nearest(path.name, sorted(p.name for p in islice(candidates, _MAX_COMPARED)), most=_MAX_SUGGESTIONS)
+    return f"no such file; did you mean {' or '.join(map(repr, names))}?" if names else "no such file"
 
 
 def from_json(text: str, largest: int = LARGEST_JSON) -> Any:
-    """Parse JSON from an untrusted source, within limits of length, depth and memory.
+    """Parse JSON from an untrusted source, with limits for length, depth and memory.
 
     Raises:
-        ValueError: if the text is not JSON, or beyond a limit.
+        ValueError: if the text is not JSON, or exceeds a limit.
     """
-    if len(text) > largest or sum(map(text.count, '[{:"')) > _MARKS:
-        raise ValueError(f"more than {largest} characters of JSON, or {_MARKS} lists, tables and texts")
+    if len(text) > largest or sum(map(text.count, '[{:"')) > _MAX_ITEMS:
+        raise ValueError(f"more than {largest} characters of JSON, or {_MAX_ITEMS} lists, tables and texts")
     with suppress(RecursionError):
         data = json.loads(text)
-        if _depth(data) <= _DEEPEST:
+        if _measure_depth(data) <= _MAX_DEPTH:
             return data
-    raise ValueError(f"lists and tables more than {_DEEPEST} deep")
+    raise ValueError(f"lists and tables more than {_MAX_DEPTH} deep")
 
 
-def _depth(data: Any) -> int:
-    """Levels of lists and tables."""
+def _measure_depth(data: Any) -> int:
+    """Number of nested levels of lists and tables."""
     inner = data.values() if isinstance(data, dict) else data if isinstance(data, list) else None
-    return 0 if inner is None else 1 + max((_depth(v) for v in inner if isinstance(v, dict | list)), default=0)
+    return 0 if inner is None else 1 + max((_measure_depth(v) for v in inner if isinstance(v, dict | list)), default=0)
 
 
-def as_path(given: object, what: str) -> Path:
-    """A path that a user gave as text or path.
+def as_path(value: object, what: str) -> Path:
+    """Convert an argument of a user to a path; it must be a text or a path.
 
     Args:
         what: the file in words, for messages.
 
     Raises:
-        InputError: if it is neither.
+        InputError: if it is neither a text nor a path.
     """
-    if not isinstance(given, str | PathLike):
-        raise InputError([Fault(f"found {short(given)}; accepted: the path of {what}", ("path",))])
-    return Path(given)
+    if not isinstance(value, str | PathLike):
+        raise InputError([Fault(f"found {short(value)}; accepted: the path of {what}", ("path",))])
+    return Path(value)
 
 
 def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> None:
-    """Write rows with the same names as a CSV table; its header has names and units.
+    """Write rows, which all have the same names, as a CSV table; its header has names and units.
 
     Raises:
         OSError: if the file cannot be written.
@@ -267,7 +270,7 @@ def write_csv(path: str | PathLike[str], rows: Sequence[Mapping[str, Any]], unit
 
 
 def write_text(path: str | PathLike[str], text: str, *, new: bool = False) -> None:
-    """Write a text atomically in UTF-8, line breaks unchanged.
+    """Write a text atomically in UTF-8; line breaks stay unchanged.
 
     Args:
         new: fail if `path` exists.

@@ -1,6 +1,6 @@
-"""Processes that can be killed: workers of executors, and SCIP, which may crash or must end at a deadline.
+"""Processes that can be killed: workers of executors, and the solver SCIP, which may crash or must end at a time limit.
 
-They do not use `multiprocessing`, because Dask workers may not have such children.
+They do not use `multiprocessing`, because Dask workers may not have such child processes.
 """
 
 import os
@@ -23,15 +23,15 @@ class ProcessEnded(RuntimeError):
 
 
 class Killable:
-    """A process that makes one call at a time. It ignores Ctrl-C, and ends with this program even after a crash.
+    """A process that runs one call at a time. It ignores Ctrl-C, and ends when this program ends, even by a crash.
 
     Args:
-        prepare: called there first; its exceptions are ignored.
+        prepare: the process calls it first, and ignores its exceptions.
     """
 
     def __init__(self, prepare: Callable[[], object] = bool) -> None:
         self._process = start()
-        with suppress(OSError):  # it has ended: the first call raises that
+        with suppress(OSError):  # the process has ended; the first call will raise the error
             self._send(prepare)
 
     def _send(self, message: object) -> None:
@@ -39,22 +39,22 @@ class Killable:
         self._process.stdin.flush()
 
     def answer(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """The result or exception of a call in the process.
+        """Call a function in the process; return its result or raise its exception.
 
         Raises:
-            ProcessEnded: if it does not answer.
+            ProcessEnded: if the process ends before it answers.
         """
         try:
             self._send((function, arguments))
             answer, error = pickle.load(self._process.stdout)
-        except Exception as ended:
-            raise ProcessEnded(str(ended)) from ended
+        except Exception as cause:
+            raise ProcessEnded(str(cause)) from cause
         if error is not None:
             raise error
         return answer
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-        """A future of the `answer` to a call."""
+        """Start a call in the process; the future gets its `answer`."""
         future = Future[Any]()
 
         def wait() -> None:
@@ -67,7 +67,7 @@ class Killable:
         return future
 
     def end(self) -> str:
-        """Kill the process; ``signal 9`` or ``exit code 1`` if it had ended before."""
+        """Kill the process; return how it ended, such as ``signal 9``, or ``exit code 1`` if it had ended before."""
         self._process.kill()
         code = self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout):
@@ -77,7 +77,7 @@ class Killable:
 
 
 def start() -> Any:
-    """Start a process that runs `serve`, with this import path; it does not run the user's script again."""
+    """Start a process that runs `serve`, with the import path of this one; it does not run the user's script again."""
     code = "import sys; sys.path[:] = sys.argv[1:]; from tmsopt.killable import serve; serve()"
     return subprocess.Popen(
         [sys.executable, "-c", code, *sys.path],
@@ -90,7 +90,7 @@ def start() -> Any:
 
 
 def serve() -> None:
-    """Answer calls until the parent ends, even during a call."""
+    """Answer calls until the parent process ends; then end, even during a call."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     calls, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     silence = os.open(os.devnull, os.O_RDWR)
@@ -105,8 +105,8 @@ def serve() -> None:
         answer, error = None, None
         try:
             answer = function(*arguments)
-        except Exception as raised:
-            error = raised
+        except Exception as exception:
+            error = exception
         with suppress(OSError):  # the parent has ended
             pickle.dump((answer, error), answers, protocol=pickle.HIGHEST_PROTOCOL)
             answers.flush()

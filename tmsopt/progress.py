@@ -1,4 +1,4 @@
-"""Progress of long work: one kind of record for every function, sent to a listener at most 20 times a second."""
+"""Progress of long work: every function sends the same kind of record to a listener, at most 20 times a second."""
 
 import math
 import time
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from tmsopt.errors import InputError, call_faults
 
 PAUSE = 0.05
-"""Least time in s between two records of one task; its first and last are always sent."""
+"""Shortest time in s between two records of one task; its first and last record are always sent."""
 
-_SETTLED, _STEPS, _PART = 2.0, 8, 0.05
-"""The remaining time is estimated after so many seconds, and so many steps or such a part of all. Before that, modules
-and processes start, and single steps differ widely."""
+_MIN_SECONDS, _MIN_STEPS, _MIN_SHARE = 2.0, 8, 0.05
+"""The remaining time is estimated after so many seconds, and after so many steps or this share of all steps. Before,
+modules and processes start, and the times of single steps differ widely."""
 
-_SHARE = 9.0  # pause after a call of the listener, in times that call took: it costs a tenth of the time at most
+_PAUSE_PER_CALL = 9.0  # pause after a call of the listener, in durations of that call, which so take 10 % of the time
 
 
 @dataclass(frozen=True)
@@ -25,11 +25,11 @@ class Progress:
         what: name of the task, such as ``searching``.
         done: amount done, which never decreases; nan if the task counts nothing.
         most: upper bound of `done`; nan if unknown.
-        unit: unit of both: ``start``, ``row``, ``design`` …, or ``s`` for a task with a time limit; empty if the task
-            counts nothing.
+        unit: unit of `done` and `most`: ``start``, ``row``, ``design`` …, or ``s`` for a task with a time limit; empty
+            if the task counts nothing.
         seconds: time since the task began.
         left: upper estimate of the remaining time in s; nan while unknown, as after a few steps.
-        note: quality so far, such as ``gap 0.001``; often empty.
+        note: quality of the result until now, such as ``gap 0.001``; often empty.
 
     Example:
         >>> from itertools import pairwise
@@ -54,49 +54,49 @@ Listener = Callable[[Progress], None]
 """A callback. An exception raised in it stops the work; KeyboardInterrupt acts like Ctrl-C."""
 
 Counts = Callable[..., None]
-"""Called by the work with the amount done, its upper bound, and perhaps a note."""
+"""A function that the work calls with the amount done, its upper bound, and optionally a note."""
 
 
 class Steps:
-    """Turns counts of one task after the other into records for a listener; a `Counts`."""
+    """Turns counts of successive tasks into records for a listener; it is a `Counts`."""
 
     def __init__(self, listener: Listener) -> None:
         self._listener = listener
-        self._before: dict[str, float] = {}  # amount done of each task, when it was last left or restarted
+        self._earlier_amounts: dict[str, float] = {}  # amount done of each task before it was left or restarted
         self._what, self._done = "", 0.0
 
     def begin(self, what: str, unit: str = "") -> None:
         """Begin a task, or continue it if it is the current one."""
         if what != self._what:
-            self._before[self._what] = self._done
+            self._earlier_amounts[self._what] = self._done
             self._what, self._unit = what, unit
             self._began, self._due = time.perf_counter(), 0.0
             self._first: tuple[float, float] | None = None
-            self._done, self._last = self._before.setdefault(what, 0.0), 0.0
+            self._done, self._last = self._earlier_amounts.setdefault(what, 0.0), 0.0
             self._send(self._done if unit else math.nan, math.nan)
 
     def __call__(self, done: float, most: float, note: str = "") -> None:
         """Report the amount done. If it has decreased, the task was restarted, and the earlier amount is added."""
         if done < self._last:
-            self._before[self._what] = self._done
-        self._last, before = done, self._before[self._what]
-        self._done = before + done
+            self._earlier_amounts[self._what] = self._done
+        self._last, earlier_amount = done, self._earlier_amounts[self._what]
+        self._done = earlier_amount + done
         now = time.perf_counter()
         self._first = self._first or (self._done, now)
         if done >= most or now >= self._due:
-            self._send(self._done, before + most, note)
-            after = time.perf_counter()
-            self._due = after + max(PAUSE, _SHARE * (after - now)) if PAUSE else 0.0
+            self._send(self._done, earlier_amount + most, note)
+            end = time.perf_counter()
+            self._due = end + max(PAUSE, _PAUSE_PER_CALL * (end - now)) if PAUSE else 0.0
 
     def _send(self, done: float, most: float, note: str = "") -> None:
-        now, left = time.perf_counter(), math.nan
+        now, remaining_time = time.perf_counter(), math.nan
         if self._unit == "s":
-            left = most - done
-        elif self._first:  # rate since the first report: earlier amounts took no time in this task
-            steps, took = done - self._first[0], now - self._first[1]
-            if took >= _SETTLED and (steps >= _STEPS or steps > _PART * (most - self._first[0])):
-                left = (most - done) * took / steps
-        self._listener(Progress(self._what, done, most, self._unit, now - self._began, left, note))
+            remaining_time = most - done
+        elif self._first:  # use the rate since the first report, because earlier amounts took no time in this task
+            steps, duration = done - self._first[0], now - self._first[1]
+            if duration >= _MIN_SECONDS and (steps >= _MIN_STEPS or steps > _MIN_SHARE * (most - self._first[0])):
+                remaining_time = (most - done) * duration / steps
+        self._listener(Progress(self._what, done, most, self._unit, now - self._began, remaining_time, note))
 
 
 def begin(steps: Steps | None, what: str, unit: str = "") -> None:
@@ -106,7 +106,7 @@ def begin(steps: Steps | None, what: str, unit: str = "") -> None:
 
 
 def steps_for(listener: Listener | None) -> Steps | None:
-    """The `Steps` that report to a listener; None without one.
+    """The `Steps` that report to a listener; None without a listener.
 
     Raises:
         InputError: if the listener cannot be called.
@@ -117,7 +117,7 @@ def steps_for(listener: Listener | None) -> Steps | None:
 
 
 def start_steps(listener: Listener | None, what: str, unit: str = "") -> Steps | None:
-    """`steps_for` a listener, with its first task begun."""
+    """Make the `Steps` of a listener, and begin their first task."""
     steps = steps_for(listener)
     begin(steps, what, unit)
     return steps

@@ -1,4 +1,4 @@
-"""Base classes of results, read-only containers, and records as plain data."""
+"""Base classes of results, read-only containers, and the conversion of records to plain data."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -29,14 +29,14 @@ AnyNumbers = Mapping[str, Any]
 
 
 class Printable(Protocol):
-    """A result that prints and draws itself. `tmsopt.documents`, imported on first use, writes it."""
+    """A result that can print and draw itself. It uses `tmsopt.documents`, imported at first use."""
 
     def report(self, full: bool = False) -> str:
-        """The text that the command line prints; every section if `full`."""
+        """The text that the command line prints; with all sections if `full`."""
         return str(call_documents("report", self, full))
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw the result into `ax`, or into new Axes, which a notebook and ``plt.show()`` show.
+        """Draw the result into `ax`, or into new Axes, which are shown in a notebook or by ``plt.show()``.
 
         Raises:
             InputError: if results of this kind have no figure.
@@ -58,7 +58,7 @@ class Tabular(Printable, Protocol):
     """A result that is also a table."""
 
     def records(self) -> Iterable[Mapping[str, Any]]:
-        """One record per row."""
+        """One record for each row."""
         ...
 
     def to_frame(self) -> "DataFrame":
@@ -71,12 +71,12 @@ class Tabular(Printable, Protocol):
 
 
 def call_documents(name: str, *arguments: Any, **options: Any) -> Any:
-    """Call a function of `tmsopt.documents` by name: results cannot import that package, which imports them."""
+    """Call a function of `tmsopt.documents` by name; results cannot import this package, because it imports them."""
     return getattr(import_module("tmsopt.documents"), name)(*arguments, **options)
 
 
 def frame(rows: Iterable[Mapping[str, Any]] | Mapping[str, Any]) -> "DataFrame":
-    """Rows, or columns by name, as a pandas DataFrame.
+    """Rows, or a mapping from names to columns, as a pandas DataFrame.
 
     Raises:
         InputError: if pandas is not installed.
@@ -118,9 +118,9 @@ class Column(Sequence[float]):
         self._values = np.array(values, dtype=np.float64)
         self._values.flags.writeable = False
 
-    def __getitem__(self, where: Any) -> Any:
+    def __getitem__(self, index: Any) -> Any:
         """A float, or a Column for a slice."""
-        return Column(self._values[where]) if isinstance(where, slice) else float(self._values[where])
+        return Column(self._values[index]) if isinstance(index, slice) else float(self._values[index])
 
     def __len__(self) -> int:
         return len(self._values)
@@ -141,18 +141,18 @@ class Column(Sequence[float]):
         return Column, (self._values,)
 
     def __repr__(self) -> str:
-        first = ", ".join(f"{value:.6g}" for value in self._values[:4].tolist())
-        return f"Column({first}{', …' if len(self) > 4 else ''}; {len(self)})"
+        first_values = ", ".join(f"{value:.6g}" for value in self._values[:4].tolist())
+        return f"Column({first_values}{', …' if len(self) > 4 else ''}; {len(self)})"
 
 
 def plain(record: Any, names: str = "", digits: int | None = None) -> dict[str, Any]:
-    """A record or a table as data for ``json.dumps``.
+    """A record or a mapping as data for ``json.dumps``.
 
-    nan and infinity become None, complex numbers tables of re and im; inner records are written by their `to_json`.
+    nan and infinity become None, complex numbers become tables of re and im; `to_json` converts inner records.
 
     Args:
-        names: attributes to take, in this order; by default every field.
-        digits: significant digits of numbers; by default all.
+        names: names of attributes, separated by blanks, in this order; by default every field.
+        digits: number of significant digits; by default all.
     """
     if isinstance(record, Mapping):
         return {str(name): _plain(value, digits) for name, value in record.items()}

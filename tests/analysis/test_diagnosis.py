@@ -16,7 +16,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.analysis import Response, diagnose_roots
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices, tms
 from tmsopt.roots import jordan, structure
 

@@ -15,7 +15,7 @@ from mpmath import mp
 import tmsopt
 from tmsopt import laws
 from tmsopt.analysis import move_limit, natural_step, round_design, step_within
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.documents import describe_rounding
 from tmsopt.models import Range, from_coefficients, tms
 from tmsopt.problem import Unit, unit_of

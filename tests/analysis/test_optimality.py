@@ -14,7 +14,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.analysis import NOT_COVERED, NOT_MINIMAL, STRICT, UNDECIDED
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.models import tms
 
 NATIVE = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")

@@ -23,7 +23,7 @@ pytestmark = [
     pytest.mark.usefixtures("interruptible"),
 ]
 
-commands = import_module("tmsopt.cli.commands").every.commands
+commands = import_module("tmsopt.cli.commands").command_group.commands
 ending = import_module("tmsopt.cli.ending")
 answers = import_module("tmsopt.cli.answers")
 
@@ -79,7 +79,7 @@ def test_an_exec_that_is_interrupted_changes_no_status(tmp_path):
     program = f"""
 from importlib import import_module
 from tmsopt.cli import main
-import_module("tmsopt.cli.commands").every.commands["schema"].callback = lambda **_: exec({work!r})
+import_module("tmsopt.cli.commands").command_group.commands["schema"].callback = lambda **_: exec({work!r})
 main()
 """
     (tmp_path / "program.py").write_text(program, encoding="utf-8")

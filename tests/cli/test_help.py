@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tmsopt.cli import every
+from tmsopt.cli import command_group
 
 PAGE = (Path(__file__).parents[2] / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
 STATUSES = (0, 1, 2, 3, 4, 130, 143, 129, 141)
@@ -16,7 +16,7 @@ def _eighty_columns(monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
 
 
-@pytest.mark.parametrize("name", every.commands)
+@pytest.mark.parametrize("name", command_group.commands)
 def test_the_help_of_a_command_fits_a_screen(run, name):
     status, out, err = run(name, "--help")
     lines = out.splitlines()
@@ -30,10 +30,10 @@ def test_the_help_of_a_command_fits_a_screen(run, name):
     assert lines[-1] == "More: docs/reference/commands.md"
 
 
-@pytest.mark.parametrize("name", every.commands)
+@pytest.mark.parametrize("name", command_group.commands)
 def test_the_help_names_every_option(run, name):
     out = run(name, "--help")[1]
-    options = [p for p in every.commands[name].params if p.param_type_name == "option" and not p.hidden]
+    options = [p for p in command_group.commands[name].params if p.param_type_name == "option" and not p.hidden]
     assert "--color" in out
     assert [p.name for p in options if not (p.help and re.search(rf"^  .*{p.opts[0]}\b", out, re.MULTILINE))] == []
 
@@ -43,7 +43,7 @@ def test_the_help_of_all_lists_each_command_on_a_line(run):
     lines = out.splitlines()
     listed = re.findall(r"^  ([a-z]+)  +[A-Z].*\.$", out[out.index("Commands:") :], re.MULTILINE)
     assert status == 0
-    assert listed == list(every.commands)
+    assert listed == list(command_group.commands)
     assert max(map(len, lines)) <= 80
     assert "..." not in out.replace("[ARGS]...", "")
     assert "…" not in out

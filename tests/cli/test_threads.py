@@ -19,7 +19,7 @@ except SystemExit:
     pass
 """
 LIBRARY = "import tmsopt; tmsopt.models.tms"
-CALLED = 'from tmsopt.cli import every; every.main(["describe", "tms"], standalone_mode=False)'
+CALLED = 'from tmsopt.cli import command_group; command_group.main(["describe", "tms"], standalone_mode=False)'
 COUNT = """
 import json, os, numpy
 from threadpoolctl import threadpool_info

@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from scipy.linalg import eig
 
 import tmsopt
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.dynamics import simulate_noise, stationary_covariance
 from tmsopt.models import canonical, from_matrices, whipple
 

@@ -18,7 +18,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 import tmsopt
 from tmsopt import InputError, NotSolved, Problem
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.models import from_coefficients, tms
 from tmsopt.search import solve_any_status
 

@@ -17,7 +17,7 @@ from helpers import oracles
 from mpmath import mp
 
 from tmsopt import laws
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.documents import write_ledger_page
 from tmsopt.paper.ledger import (
     VERDICTS,

@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tmsopt import laws
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.paper import (
     benchmark,
     ep_set,

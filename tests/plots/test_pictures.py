@@ -14,7 +14,7 @@ from matplotlib.collections import LineCollection, QuadMesh
 
 import tmsopt
 from tmsopt import laws, plots
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 
 WEAVE, CAPSIZE = 4.29238253634111, 6.02426201538837  # Meijaard et al. (2007), section 6
 MODES_AT_5 = {

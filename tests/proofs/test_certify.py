@@ -21,7 +21,7 @@ from scipy.optimize import brentq  # type: ignore[import-untyped]
 
 from benchmarks.suites import REFERENCES, random_problem, references
 from tmsopt import InputError, Problem, certify, load, models, solve
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.global_search import SCIP, GlobalSolver, SolverPool
 from tmsopt.problem import Band, Bound
 

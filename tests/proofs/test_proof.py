@@ -17,7 +17,7 @@ from mpmath import atan, mp, mpf, sqrt, tan, workdps
 
 from tmsopt import InputError, Problem, load, models, prove, solve
 from tmsopt.algebra import Number, ProofFailed, enclose_solution, number, refine_solution
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.documents import list_numbers
 from tmsopt.models import decimal
 from tmsopt.problem import Case

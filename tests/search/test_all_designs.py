@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from helpers.skates import skate
 
 import tmsopt
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
 from tmsopt.search import estimate_coverage
 

@@ -10,7 +10,7 @@ import sympy as sp
 from click.testing import CliRunner
 
 import tmsopt
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.documents import list_events
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
 

@@ -12,7 +12,7 @@ from helpers.wells import LEFT, depth, wells, x
 import tmsopt
 from tmsopt.global_search import SCIP
 from tmsopt.models import from_coefficients
-from tmsopt.studies import Sampling, plan_study
+from tmsopt.studies import Sampling, prepare_study
 
 solving = import_module("tmsopt.search.solve")
 asking = import_module("tmsopt.global_search.stability")
@@ -140,7 +140,7 @@ def test_a_second_one_ends_that_too(monkeypatch):
         lambda asked: tmsopt.solve(asked, progress=stop, interruptible=False, throw=False),
         lambda asked: tmsopt.speeds(asked, progress=stop),
         lambda asked: tmsopt.compare(asked, progress=stop),
-        lambda asked: plan_study(Sampling(asked, 10, tolerances={"mu": 0.01}), progress=stop),
+        lambda asked: prepare_study(Sampling(asked, 10, tolerances={"mu": 0.01}), progress=stop),
     ],
 )
 def test_verbs_that_solve_on_the_way_are_ended_whole(verb):

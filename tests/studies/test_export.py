@@ -239,7 +239,7 @@ def test_no_cell_of_a_csv_is_a_formula(first, tmp_path):
 
 def test_heads_of_csv_name_units():
     """Of a parameter, what varies, a report and a violation; of an end or a limit those of its name."""
-    bare = import_module("tmsopt.studies.export")._bare
+    bare = import_module("tmsopt.studies.export")._strip_header
     names = ("v", "varied.lambda_s.max", "varied.arm.limit", "report.u_H", "violation.arm", "law.w0")
     assert [bare(name) for name in names] == ["v", "lambda_s", "arm", "u_H", "arm", "law.w0"]
     assert (format_header("v", "m/s"), format_header("mu", "")) == ("v (m/s)", "mu")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from helpers.rows import assert_same, stored
 
-from tmsopt.studies import load_study, plan_study, read_results, solve_row, view_store
+from tmsopt.studies import load_study, prepare_study, read_results, solve_row, view_store
 
 ROWS, KILLS, SAMPLE = 20_000, 30, 25
 PAUSE = (0.3, 2.0)
@@ -73,7 +73,7 @@ def test_nothing_is_lost_or_solved_twice(tmp_path):
     assert min(killed.values()) >= KILLS // 4
     with view_store(path) as store:
         added = sum(session["rows"] for session in store.sessions())
-    study = plan_study(load_study(tmp_path / "built.toml"))
+    study = prepare_study(load_study(tmp_path / "built.toml"))
     rows = read_results(study, path).rows
     assert [row.number for row in rows] == list(range(ROWS))
     assert added == ROWS

@@ -31,7 +31,7 @@ from tmsopt.studies import (
     load_study,
     monte_carlo,
     over_grid,
-    plan_study,
+    prepare_study,
     read_csv,
     sobol,
     sobol_note,
@@ -633,9 +633,9 @@ def test_monte_carlo_is_reproducible_and_longer_ones_begin_alike(design):
 def test_monte_carlo_plans_from_its_problem(design):
     tolerances = dict(design.problem.tolerances)
     sampling = Sampling(design.problem.posed.nominal, 20, seed=1, tolerances=tolerances)
-    assert plan_study(sampling).columns == monte_carlo(design, 20, seed=1).columns
+    assert prepare_study(sampling).columns == monte_carlo(design, 20, seed=1).columns
     study = Study(PROBLEM, ABOUT)
-    assert plan_study(study) is study
+    assert prepare_study(study) is study
     with pytest.raises(tmsopt.NotSolved):
         monte_carlo(replace(design, status="infeasible"), 20)
 
@@ -677,7 +677,7 @@ def test_yield_counts_rows_by_what_they_are():
     ("name", "rows"), [("study_sway", 15), ("study_heights", 32), ("study_decay", 31), ("study_built", 500)]
 )
 def test_rows_of_the_studies_in_the_repository(name, rows):
-    study = plan_study(load_study(hunt.PROBLEMS / f"{name}.toml"))
+    study = prepare_study(load_study(hunt.PROBLEMS / f"{name}.toml"))
     assert (len(study), study.notes) == (rows, ())
     for row in range(0, rows, 7):
         study.row_problem(row)
@@ -685,7 +685,7 @@ def test_rows_of_the_studies_in_the_repository(name, rows):
 
 def test_what_study_built_promises():
     """By eigenvalues of the rows; a design that is a little off has simple roots, good to 1e-8."""
-    study = plan_study(load_study(hunt.PROBLEMS / "study_built.toml"))
+    study = prepare_study(load_study(hunt.PROBLEMS / "study_built.toml"))
     fixed = {name: np.asarray(value) for name, value in study.problem.fixed.items()}
     found = hunt.abscissa({**fixed, **{name: np.asarray(column) for name, column in study.columns.items()}})
     assert np.median(found) == pytest.approx(-1.36, abs=0.005)

@@ -20,7 +20,7 @@ from helpers.rows import assert_same, faults, row as row_of, stored
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from tmsopt import laws
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.evaluation import law_rows
 from tmsopt.executor import Crash
 from tmsopt.models import tms
@@ -250,14 +250,14 @@ def test_warm_starts_find_the_optima_of_cold_ones():
 def test_rows_without_a_design_are_not_solved_again_on_the_way_back(monkeypatch):
     """No design has Fr above 4: such rows are solved from many starts once each."""
     tried = Counter()
-    original = Solver._answer
+    original = Solver._solve_row
 
     def counting(self, number, neighbour=None, afar=0):
         if neighbour is None or neighbour.status != "optimal":
             tried[number] += 1
         return original(self, number, neighbour, afar)
 
-    monkeypatch.setattr(Solver, "_answer", counting)
+    monkeypatch.setattr(Solver, "_solve_row", counting)
     problem = replace(TWO, constraints={"fast": "Fr >= 0"})
     study = over_grid(problem, {"fast.limit": [0.0, 1.0, 2.0, 5.0, 5.5, 6.0]}, warm=True)
     rows = run_study(study, workers=1).rows

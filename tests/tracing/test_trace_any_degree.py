@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from helpers.oracles import discriminant_exact
 
 from tmsopt.analysis import optimality
-from tmsopt.cli import every as main
+from tmsopt.cli import command_group as main
 from tmsopt.errors import InputError
 from tmsopt.models import from_coefficients, from_matrices, whipple
 from tmsopt.plots import trace_figure

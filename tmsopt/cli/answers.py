@@ -1,6 +1,6 @@
-"""Answers: JSON or text on stdout, laid out for the terminal or pipe that reads it, and the files that go with them.
+"""Answers: JSON or text on stdout, laid out for the terminal or pipe that reads it, and the files that options name.
 
-Files are refused before any work is done, written as a whole, and named on stderr.
+A file name is checked before any work is done. A file is written completely or not at all, and named on stderr.
 """
 
 import json
@@ -23,28 +23,29 @@ from tmsopt.errors import input_error
 from tmsopt.files import read_text, write_text
 
 FIGURES, PAGES = ("png", "pdf", "svg"), ("html", "htm")
-"""Endings of figures, and of pages to hand on."""
+"""Endings of figures, and of pages for a browser."""
 
 WORDS = "tmsopt.words"
-"""Key of the words of the command line in what click's context keeps."""
+"""Key of the words of the command line in the `meta` of click's context."""
 
-_PIPE, _NARROWEST, _WIDEST = 100, 40, 160  # columns of a pipe; least and most of a terminal
-_BLOCK = 5000  # rows of JSON made and written at once
-_LETTERS = "√±×…−ωε"  # of reports
+_PIPE_COLUMNS, _MIN_COLUMNS, _MAX_COLUMNS = 100, 40, 160  # columns in a pipe; limits of those in a terminal
+_BLOCK = 5000  # number of JSON rows that are made and written at once
+_REPORT_LETTERS = "√±×…−ωε"  # letters of reports that some encodings lack
 
 
 @dataclass(frozen=True)
 class Reply:
-    """What a command found.
+    """The answer of a command.
 
     Attributes:
         result: a result, or a text.
+        status: exit status.
         data: the JSON; by default the `to_json` of the result.
-        level: of its document and its page, brief or full.
+        level: level of the document and the page of the result, brief or full.
         draw, write_csv: make the figure and the table; by default `plot` and `write_csv` of the result.
         page: options of `tmsopt.save_report`.
-        shown: on stdout instead of the result: its document, or a list of results and texts.
-        without: names of files that are not written.
+        content: printed instead of the result: its document, or a list of results and texts.
+        skipped_options: names of options, separated by blanks, whose files are not written.
     """
 
     result: Any
@@ -54,53 +55,53 @@ class Reply:
     draw: Callable[[], Any] | None = None
     write_csv: Callable[[Path], object] | None = None
     page: Mapping[str, Any] = field(default_factory=dict)
-    shown: Any = None
-    without: str = ""
+    content: Any = None
+    skipped_options: str = ""
 
 
-def deliver(command: Any, found: Reply) -> int:
-    """Write the answer of a command, then the files that its options name; its exit status."""
-    answer(command.json, found.shown or found.result, lambda: found.data or found.result.to_json(), found.level)
-    write_files(command, found)
-    return found.status
+def deliver(command: Any, reply: Reply) -> int:
+    """Write the answer of a command, then the files that its options name; return its exit status."""
+    answer(command.json, reply.content or reply.result, lambda: reply.data or reply.result.to_json(), reply.level)
+    write_files(command, reply)
+    return reply.status
 
 
-def write_files(command: Any, found: Reply, *files: Path) -> None:
-    """Write what the options of a command name; `files` state its problem, by default FILE."""
-    result = found.result
+def write_files(command: Any, reply: Reply, *files: Path) -> None:
+    """Write the files that the options of a command name; `files` contain its problem, by default FILE."""
+    result = reply.result
 
     def save_page(path: Path) -> None:
         texts = {file.name: read_text(str(file), "TOML problem file") for file in files or [command.file]}
         line = shlex.join(["tmsopt", *click.get_current_context().meta.get(WORDS, ())])
         seed = {"seed": command.seed} if hasattr(command, "seed") else {}
-        is_full, progress = found.level == "full", progress_listener()
+        is_full, progress = reply.level == "full", progress_listener()
         tmsopt.save_report(
-            result, path, command=line, files=texts, full=is_full, progress=progress, **seed, **found.page
+            result, path, command=line, files=texts, full=is_full, progress=progress, **seed, **reply.page
         )
 
     def write_table(path: Path) -> None:
-        (found.write_csv or result.write_csv)(path)
+        (reply.write_csv or result.write_csv)(path)
 
     def draw(path: Path) -> None:
-        tmsopt.plots.save((found.draw or result.plot)(), path)
+        tmsopt.plots.save((reply.draw or result.plot)(), path)
 
     for name, write in {"csv": write_table, "plot": draw, "report": save_page}.items():
-        if name not in found.without:
+        if name not in reply.skipped_options:
             write_file(f"--{name}", getattr(command, name, None), write)
 
 
-def answer(as_json: bool, shown: Any, data: Callable[[], Any], level: str = "brief") -> None:
-    """Write JSON, or results, documents and texts, to stdout; a signal waits until they are written."""
+def answer(as_json: bool, content: Any, data: Callable[[], Any], level: str = "brief") -> None:
+    """Write JSON, or results, documents and texts, to stdout; a signal is handled after they are written."""
     show_step("writing the answer")
-    several = shown if isinstance(shown, list | tuple) else [shown]
-    documents = [] if as_json else [make_document(one, level) for one in several]
+    results = content if isinstance(content, list | tuple) else [content]
+    documents = [] if as_json else [make_document(result, level) for result in results]
     with hold_signals():
         text = format_json(data()) if as_json else "\n\n".join(map(lay_out, documents))
-        click.echo(text, color=is_coloured())  # or else click takes colours out of a pipe
+        click.echo(text, color=is_coloured())  # without this, click removes colours in a pipe
 
 
 def make_document(result: Any, level: Any = "brief", **options: Any) -> Any:
-    """The document of a result; progress shows what is computed for it. A text stays a text."""
+    """The document of a result, while progress is shown. A text stays a text."""
     from tmsopt.documents import Document, document_of
 
     if isinstance(result, str | Document):
@@ -110,18 +111,18 @@ def make_document(result: Any, level: Any = "brief", **options: Any) -> Any:
 
 
 def lay_out(document: Any) -> str:
-    """The text of a document for this stdout."""
+    """The text of a document, with the width, colours and letters of this stdout."""
     if isinstance(document, str):
         return document
     from tmsopt.documents import to_text
 
-    width = min(max(count_columns(sys.stdout), _NARROWEST), _WIDEST) if sys.stdout.isatty() else _PIPE
-    encoded = _LETTERS.encode(sys.stdout.encoding or "utf-8", "ignore")
-    return to_text(document, width, is_coloured(), len(encoded) < len(_LETTERS))
+    width = min(max(count_columns(sys.stdout), _MIN_COLUMNS), _MAX_COLUMNS) if sys.stdout.isatty() else _PIPE_COLUMNS
+    encoded = _REPORT_LETTERS.encode(sys.stdout.encoding or "utf-8", "ignore")
+    return to_text(document, width, is_coloured(), len(encoded) < len(_REPORT_LETTERS))
 
 
 def is_coloured() -> bool:
-    """Whether --color, or else the terminal and its environment, ask for colours."""
+    """Whether to colour the text: --color decides, otherwise the terminal and its environment."""
     context = click.get_current_context(silent=True)
     if context and context.color is not None:
         return context.color
@@ -129,31 +130,31 @@ def is_coloured() -> bool:
 
 
 def format_json(data: Any) -> str:
-    """JSON for stdout; it escapes what stdout cannot encode."""
-    narrow = not (sys.stdout.encoding or "utf").lower().startswith("utf")
-    return json.dumps(data, indent=2, ensure_ascii=narrow, allow_nan=False)
+    """JSON for stdout; characters that stdout cannot encode are escaped."""
+    is_narrow = not (sys.stdout.encoding or "utf").lower().startswith("utf")
+    return json.dumps(data, indent=2, ensure_ascii=is_narrow, allow_nan=False)
 
 
 def answer_rows(data: dict[str, Any], key: str, rows: Sequence[Any]) -> None:
     """Write JSON with a long list of rows under a key, block by block.
 
     Args:
-        data: with an empty list under the key.
-        rows: that have `to_json`.
+        data: the JSON, with an empty list under the key.
+        rows: objects with `to_json`.
     """
     show_step("writing the answer")
-    before, head, after = format_json(data).partition(f'\n  "{key}": [')
+    head, row_list, tail = format_json(data).partition(f'\n  "{key}": [')
     with hide_progress() if sys.stdout.isatty() else nullcontext():
-        click.echo(before + head, nl=False)
+        click.echo(head + row_list, nl=False)
         for first in range(0, len(rows), _BLOCK):
             block = [row.to_json() for row in rows[first : first + _BLOCK]]
-            text = format_json(block)[1:-2].replace("\n", "\n  ")  # without brackets, further in
+            text = format_json(block)[1:-2].replace("\n", "\n  ")  # without brackets, and indented
             click.echo("," * (first > 0) + text, nl=False)
-        click.echo("\n  " * bool(rows) + after)
+        click.echo("\n  " * bool(rows) + tail)
 
 
 def check_output(option: str, path: Path | None, endings: Sequence[str]) -> None:
-    """Refuse a file, or the folder of a chart, that cannot be written."""
+    """Check that a file, or the folder of a chart, can be written."""
     if path is None:
         return
     ending = path.suffix.lstrip(".").lower()
@@ -162,7 +163,7 @@ def check_output(option: str, path: Path | None, endings: Sequence[str]) -> None
     try:
         problem = "is a directory" if path.is_dir() and ending != "chart" else ""
         problem = problem or ("" if path.parent.is_dir() else "is in a directory that does not exist")
-    except OSError as error:  # a name longer than the file system takes
+    except OSError as error:  # the name is longer than the file system allows
         problem = f"is no name for a file here ({error.strerror})"
     if problem:
         raise input_error(f"'{path}' {problem}; give the path of a file to write", option)
@@ -170,7 +171,7 @@ def check_output(option: str, path: Path | None, endings: Sequence[str]) -> None
 
 @contextmanager
 def report_writing(option: str, path: Path) -> Iterator[None]:
-    """Name the file that was written, or say why it was not and exit with status 2."""
+    """Name the file that was written; if it could not be written, say why and exit with status 2."""
     show_step(f"writing what {option} asks for")
     try:
         yield
@@ -190,11 +191,13 @@ def write_file(option: str, path: Path | None, write: Callable[[Path], object]) 
 
 
 def write_new(option: str, path: Path, text: str) -> None:
-    """Write a new file, and the files that a problem refers to unless they exist; folders are named as a whole."""
+    """Write a new file, and the files that a problem refers to if they do not exist; a folder is named once."""
     from tmsopt.guide import companions
 
-    others = companions(text) if path.suffix == ".toml" else {}
-    files = {path: text} | {f: other for n, other in others.items() if not (f := path.parent / n).exists()}
+    companion_texts = companions(text) if path.suffix == ".toml" else {}
+    files = {path: text} | {
+        f: companion for n, companion in companion_texts.items() if not (f := path.parent / n).exists()
+    }
     for place, group in groupby(files, lambda file: file if file.parent == path.parent else file.parent):
         with report_writing(option, place):
             for file in group:
@@ -203,7 +206,7 @@ def write_new(option: str, path: Path, text: str) -> None:
 
 
 def print_or_write(text: str, path: Path | None) -> None:
-    """Print a text, or write it into the new file of --output."""
+    """Print a text, or write it to the new file that --output names."""
     if path is None:
         click.echo(text, nl=False)
     else:

@@ -18,8 +18,8 @@ from tmsopt.deprecated import no_longer_needed
 from tmsopt.errors import input_error, suggest
 
 _LAYERS = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied", "margin")
-_DRAWN = (800, 600)
-"""Most points along the axes of a figure of a large chart."""
+_MAX_FIGURE_POINTS = (800, 600)
+"""Largest number of points along the axes of a figure of a large chart."""
 
 
 def _parse_points(text: str) -> tuple[int, ...]:
@@ -67,8 +67,8 @@ class ChartCommand(WithPage, WithPlot, OnFile):
             return self._chart(folder)
         except KeyboardInterrupt:
             is_kept = folder is not None and folder.exists()
-            kept = f"the tiles done so far are in {folder}; the same command goes on"
-            click.echo(f"stopped: {kept if is_kept else 'nothing was written'}", err=True)
+            text = f"the tiles done so far are in {folder}; the same command goes on"
+            click.echo(f"stopped: {text if is_kept else 'nothing was written'}", err=True)
             sys.exit(INTERRUPTED)
 
     def _chart(self, folder: Path | None) -> Reply:
@@ -78,9 +78,9 @@ class ChartCommand(WithPage, WithPlot, OnFile):
             check_netcdf()
         problem = take_nominal(tmsopt.load(self.file).posed)
         names, layers = axes_of(problem, self.axes), self.layers or USUAL
-        is_whole = folder is None and len(names) == 2  # in memory, shown with all its layers and boundaries
+        is_whole = folder is None and len(names) == 2  # in memory, with all layers and boundaries
         self._check_plot(len(names))
-        held = self._read_slice(problem)
+        slice_values = self._read_slice(problem)
         options: dict[str, Any] = {"quantities": self.quantity, "single": self.single, "progress": progress_listener()}
         with _report_folder(folder) if folder else nullcontext():
             chart = tmsopt.chart(
@@ -98,9 +98,9 @@ class ChartCommand(WithPage, WithPlot, OnFile):
             write_file("--output", self.output, lambda path: chart.save(path, (*dict.fromkeys(layers), *self.quantity)))
 
         def draw() -> Any:
-            more = options | {"boundaries": self.boundaries}
-            drawn = chart if is_whole else tmsopt.chart(**_cut_plane(chart, held), **more)
-            return tmsopt.plots.chart_figure(drawn, self.layer)
+            figure_options = options | {"boundaries": self.boundaries}
+            figure_chart = chart if is_whole else tmsopt.chart(**_cut_plane(chart, slice_values), **figure_options)
+            return tmsopt.plots.chart_figure(figure_chart, self.layer)
 
         return Reply(chart, draw=draw)
 
@@ -115,40 +115,40 @@ class ChartCommand(WithPage, WithPlot, OnFile):
             raise input_error("two parameters are free, so there is nothing to hold; leave it out", "--slice")
 
     def _read_slice(self, problem: Any) -> dict[str, float]:
-        """The parameter that a figure holds, as a number in its range."""
-        held = {}
+        """The value at which --slice fixes a parameter, checked against its range."""
+        values = {}
         for name, text in self.slice.items():
             if name not in problem.free:
                 raise input_error(f"found '{name}'; {suggest(name, problem.free)}", "--slice")
             low, high = problem.free[name]
-            held[name] = parse_number(text, problem.parameter_set[name].unit, "--slice", name)
-            if not low <= held[name] <= high:
+            values[name] = parse_number(text, problem.parameter_set[name].unit, "--slice", name)
+            if not low <= values[name] <= high:
                 raise input_error(f"found {text}; accepted: {low:.6g} to {high:.6g}", "--slice", name)
-        return held
+        return values
 
 
 @contextmanager
 def _report_folder(folder: Path) -> Iterator[None]:
-    """Name the folder that was written, and where an old one went, or say why it was not written."""
-    before = {folder, *folder.parent.glob("*.chart")}
+    """Name the folder that was written, and the place of an old one; if it could not be written, say why."""
+    old_folders = {folder, *folder.parent.glob("*.chart")}
     try:
         yield
     except OSError as error:
         message = f"'{folder}' cannot be written: {error.strerror}; the same command will go on where it was"
         raise input_error(message, "--output") from None
-    for moved in sorted(set(folder.parent.glob("*.chart")) - before):
-        click.echo(f"moved the old folder to {moved}", err=True)
+    for moved_folder in sorted(set(folder.parent.glob("*.chart")) - old_folders):
+        click.echo(f"moved the old folder to {moved_folder}", err=True)
     click.echo(f"wrote {folder}", err=True)
 
 
-def _cut_plane(chart: Any, held: dict[str, float]) -> dict[str, Any]:
-    """The plane of a space or a folder that a figure shows: the held parameter is fixed, and points are fewer."""
+def _cut_plane(chart: Any, slice_values: dict[str, float]) -> dict[str, Any]:
+    """Arguments of the chart in a figure: the parameter of --slice is fixed, and there are fewer points."""
     problem, sizes = chart.problem, dict(zip(chart.axes, map(len, chart.grid), strict=True))
-    title = ", ".join([problem.title, *(f"{n} = {v:.6g}" for n, v in held.items())]).removeprefix(", ")
-    free = {n: ends for n, ends in problem.free.items() if n not in held}
-    axes = [n for n in chart.axes if n not in held]
+    title = ", ".join([problem.title, *(f"{n} = {v:.6g}" for n, v in slice_values.items())]).removeprefix(", ")
+    free = {n: ends for n, ends in problem.free.items() if n not in slice_values}
+    axes = [n for n in chart.axes if n not in slice_values]
     return {
-        "problem": replace(problem, fixed={**problem.fixed, **held}, free=free, start={}, title=title),
+        "problem": replace(problem, fixed={**problem.fixed, **slice_values}, free=free, start={}, title=title),
         "axes": axes,
-        "points": [min(sizes[n], most) for n, most in zip(axes, _DRAWN, strict=True)],
+        "points": [min(sizes[n], max_points) for n, max_points in zip(axes, _MAX_FIGURE_POINTS, strict=True)],
     }

@@ -1,4 +1,4 @@
-"""Commands as frozen dataclasses: a field states an argument or an option once, the docstring is the help."""
+"""Commands as frozen dataclasses: each field defines an argument or an option, and the docstring is the help."""
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,22 +13,22 @@ from tmsopt.cli.answers import FIGURES, PAGES, Reply, check_output, deliver
 from tmsopt.cli.terminal import progress_listener
 from tmsopt.errors import MOST_STARTS, Fault, InputError, input_error
 
-_OWN = {"names", "endings", "example"}  # settings of tmsopt; click knows the others
+_OWN_SETTINGS = {"names", "endings", "example"}  # settings of tmsopt; click knows the others
 
 
 def argument(default: Any = MISSING, **settings: Any) -> Any:
-    """A field that is an argument, with settings of `click.Argument`."""
+    """A field for an argument, with settings of `click.Argument`."""
     return field(default=default, metadata=settings)
 
 
 def option(text: str, default: Any = None, *names: str, **settings: Any) -> Any:
-    """A field that is an option.
+    """A field for an option.
 
     Args:
         text: its help.
         names: further names.
-        settings: `endings` of a file to write; an `example` of NAME=VALUE; or settings of `click.Option`, such as the
-            `type`: a number in a range, or a function of the text.
+        settings: the `endings` of a file to write; an `example` of NAME=VALUE; or settings of `click.Option`, such as
+            the `type`, which is a range of numbers or a function that parses the text.
     """
     return field(default=default, metadata={"help": text, "names": names, **settings})
 
@@ -41,21 +41,24 @@ class Command:
         dataclass(frozen=True, kw_only=True)(cls)
 
     def run(self) -> Any:
-        """Do the work: an `Reply`, or an exit status, which is 0 for None."""
+        """Do the work; return a `Reply`, or an exit status, where None means 0."""
         raise NotImplementedError
 
     def select(self, names: str) -> dict[str, Any]:
-        """The values that are there and not None, for a function with defaults of its own."""
+        """The values with these names that exist and are not None, for a function that has its own defaults."""
         return {name: value for name in names.split() if (value := getattr(self, name, None)) is not None}
 
     def refuse_useless(self, *checks: tuple[object, str, str]) -> None:
-        """Refuse options without an effect: whether they have none, their names, what to do.
+        """Refuse options that have no effect.
+
+        Args:
+            checks: whether options have no effect, their names, and what to do.
 
         Raises:
-            InputError: naming each of them.
+            InputError: with a fault for each of these options.
         """
-        wrong = {name: text for useless, names, text in checks if useless for name in names.split()}
-        if faults := [Fault(wrong[n], (_flag_of(n),)) for n, value in vars(self).items() if n in wrong and value]:
+        advice = {name: text for useless, names, text in checks if useless for name in names.split()}
+        if faults := [Fault(advice[n], (_make_flag(n),)) for n, value in vars(self).items() if n in advice and value]:
             raise InputError(faults)
 
 
@@ -82,7 +85,7 @@ class WithSearch(Command):
 
     @property
     def search(self) -> dict[str, Any]:
-        """What verbs that search take."""
+        """Options of the functions that search for designs."""
         return {"progress": progress_listener(), **self.select("starts seed linear_solver")}
 
 
@@ -90,11 +93,11 @@ class WithIpopt(WithSearch):
     linear_solver: Literal["mumps", "spral"] = option("Linear solver of IPOPT.", "mumps")
 
 
-# What options say
+# Values of options
 
 
 def parse_number(text: str, unit: str, *key: str) -> float:
-    """A number of the command line, plain or with a unit."""
+    """Parse a number of the command line, with or without a unit."""
     from tmsopt.problem.units import parse_quantity
 
     try:
@@ -107,12 +110,12 @@ def parse_number(text: str, unit: str, *key: str) -> float:
 
 
 def split_names(text: str) -> tuple[str, ...]:
-    """Names separated by commas."""
+    """Split names that are separated by commas."""
     return tuple(name.strip() for name in text.split(","))
 
 
 def take_nominal(problem: Any) -> Any:
-    """The posed problem about one design; a note on stderr says that scenarios and tolerances are left out."""
+    """The problem at its nominal values; a note on stderr says that scenarios and tolerances are left out."""
     if problem.nominal is not problem:
         values = _list_scenarios(problem)
         click.echo(f"scenarios and tolerances are left aside{': ' + values if values else ''}", err=True)
@@ -120,7 +123,7 @@ def take_nominal(problem: Any) -> Any:
 
 
 def note_scenarios(problem: Any, varied: Iterable[str] = ()) -> None:
-    """Say on stderr in which scenario the design for several is looked at."""
+    """Say on stderr for which scenario a design is examined, if it was found for several."""
     if values := _list_scenarios(problem, varied):
         click.echo(f"the design for all scenarios, looked at for {values}", err=True)
 
@@ -133,13 +136,13 @@ def _list_scenarios(problem: Any, varied: Iterable[str] = ()) -> str:
 
 
 def build_command(kind: type[Command], name: str) -> click.Command:
-    """The command of a class."""
-    of = fields(kind)  # type: ignore[arg-type]
-    options = {f.name for f in of if "help" in f.metadata}
+    """Build the command of a class for click."""
+    command_fields = fields(kind)  # type: ignore[arg-type]
+    options = {f.name for f in command_fields if "help" in f.metadata}
 
     def call(**values: Any) -> None:
-        for f in of:  # a value is refused before any work is done
-            flag, value = _flag_of(f.name), values[f.name]
+        for f in command_fields:  # values are checked before any work is done
+            flag, value = _make_flag(f.name), values[f.name]
             if "endings" in f.metadata:
                 check_output(flag, value, f.metadata["endings"])
             if "example" in f.metadata:
@@ -147,77 +150,77 @@ def build_command(kind: type[Command], name: str) -> click.Command:
                 values[f.name] = _parse_pairs(flag, texts, get_args(f.type)[1], f.metadata["example"])
         command = kind(**values)
         try:
-            found = command.run()
+            reply = command.run()
         except InputError as error:
             raise InputError([name_option(fault) for fault in error.faults]) from error
-        if status := deliver(command, found) if isinstance(found, Reply) else found:
+        if status := deliver(command, reply) if isinstance(reply, Reply) else reply:
             sys.exit(status)
 
     def name_option(fault: Fault) -> Fault:
-        """The fault of an argument of the library, under the option that gave it."""
+        """A fault of an argument of the library, with the option of this argument as its key."""
         first, *rest = fault.key or ("",)
-        return replace(fault, key=(_flag_of(first), *rest)) if first in options and not fault.file else fault
+        return replace(fault, key=(_make_flag(first), *rest)) if first in options and not fault.file else fault
 
-    summary, _, rest = (getdoc(kind) or "").partition("\n\n")
-    parameters = [*map(_build_parameter, of), colour_option()]
-    return _Command(name, params=parameters, callback=call, help=summary, epilog=rest)
+    summary, _, epilog = (getdoc(kind) or "").partition("\n\n")
+    parameters = [*map(_build_parameter, command_fields), colour_option()]
+    return _Command(name, params=parameters, callback=call, help=summary, epilog=epilog)
 
 
 def colour_option() -> click.Option:
-    """--color of every command, and of all of them."""
+    """The option --color, for each command and for the group of all commands."""
 
     def keep(context: click.Context, _: click.Parameter, value: str | None) -> None:
         if value:
             context.color = {"always": True, "never": False}.get(value)
 
-    kind, text = click.Choice(["auto", "always", "never"]), "Colour the text.  [default: auto]"
-    return click.Option(["--color"], type=kind, callback=keep, expose_value=False, help=text)
+    choices, text = click.Choice(["auto", "always", "never"]), "Colour the text.  [default: auto]"
+    return click.Option(["--color"], type=choices, callback=keep, expose_value=False, help=text)
 
 
 class _Option(click.Option):
-    """An option without its range in the help; the message about a number outside has it."""
+    """An option whose help does not show its range; the message about a number outside the range does."""
 
     def get_help_extra(self, ctx: click.Context) -> Any:
         return {key: value for key, value in super().get_help_extra(ctx).items() if key != "range"}
 
 
 class _Command(click.Command):
-    """A command whose help has the examples as they stand."""
+    """A command whose help shows the examples without changes of their lines."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         text = (self.epilog or "").replace("\n\nExit", "\nExit")
         formatter.write(f"\n{text}\nMore: docs/reference/commands.md\n")
 
 
-def _flag_of(name: str) -> str:
+def _make_flag(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def _build_parameter(of: Field[Any]) -> click.Parameter:
-    hint, default = of.type, None if of.default is MISSING else of.default
-    settings = {key: value for key, value in of.metadata.items() if key not in _OWN}
+def _build_parameter(field: Field[Any]) -> click.Parameter:
+    hint, default = field.type, None if field.default is MISSING else field.default
+    settings = {key: value for key, value in field.metadata.items() if key not in _OWN_SETTINGS}
     if type(None) in get_args(hint):
         hint = get_args(hint)[0]
     if "help" not in settings:
-        return click.Argument([of.name], type=_type_of(hint), required=of.default is MISSING, **settings)
-    flag, kind = _flag_of(of.name), hint
+        return click.Argument([field.name], type=_choose_type(hint), required=field.default is MISSING, **settings)
+    flag, kind = _make_flag(field.name), hint
     if get_origin(hint) in (tuple, Mapping):
         kind, settings = get_args(hint)[0], {"multiple": True, **settings}
     elif hint is bool:
         settings["is_flag"], default = True, bool(default)
-        flag += f"/--no-{of.name}" if default else ""
-    settings = {"type": _type_of(kind), "show_default": hint is not bool, **settings}
-    return _Option([of.name, flag, *of.metadata["names"]], default=default, **settings)
+        flag += f"/--no-{field.name}" if default else ""
+    settings = {"type": _choose_type(kind), "show_default": hint is not bool, **settings}
+    return _Option([field.name, flag, *field.metadata["names"]], default=default, **settings)
 
 
-def _type_of(hint: Any) -> Any:
+def _choose_type(hint: Any) -> Any:
     if get_origin(hint) is Literal:
         return click.Choice(get_args(hint))
     return click.Path(path_type=Path) if hint is Path else hint
 
 
 def _parse_pairs(flag: str, texts: Sequence[str], kind: Any, example: str) -> dict[str, Any]:
-    """The values of NAME=VALUE by name."""
+    """Parse NAME=VALUE texts; a value is a text or a number."""
     pairs: dict[str, Any] = {}
     faults = []
     for name, text in ([part.strip() for part in text.partition("=")[::2]] for text in texts):

@@ -1,4 +1,4 @@
-"""All commands as one group, which loads the module of a command when it is first used."""
+"""The group of all commands; the module of a command is loaded when the command is first used."""
 
 import logging
 import os
@@ -41,9 +41,9 @@ _MODULES: Mapping[str, Mapping[str, str]] = {
         "schema": "Write the JSON Schema of problem files, for editors.",
     },
 }
-"""Module → its commands, each a class of that name with `Command`, with their lines in `tmsopt --help`."""
+"""Module → its commands, with their lines in `tmsopt --help`. The class of ``solve`` is ``SolveCommand``."""
 
-_HOMES = {name: module for module, names in _MODULES.items() for name in names}
+_MODULE_OF_COMMAND = {name: module for module, names in _MODULES.items() for name in names}
 
 _FRONT = 'tmsopt solve FILE, with pareto = ["abscissa", "Fr"] under [objective] of FILE'
 _HINTS = {
@@ -51,7 +51,7 @@ _HINTS = {
     **dict.fromkeys(("growth", "plot"), "tmsopt solve FILE --plot growth.png"),
     **dict.fromkeys(("explain", "robustness"), "tmsopt solve FILE --full"),
 }
-"""Function of the library or option that is no command → the command that does it."""
+"""Name that is no command, but a function of the library or an option → the command that does the same."""
 
 _STATUSES = """
 Exit status:
@@ -65,31 +65,31 @@ More: docs/reference/commands.md
 
 @cache
 def _load_command(name: str) -> click.Command:
-    home = import_module(f"tmsopt.cli.{_HOMES[name]}")
-    return build_command(getattr(home, f"{name.capitalize()}Command"), name)
+    module = import_module(f"tmsopt.cli.{_MODULE_OF_COMMAND[name]}")
+    return build_command(getattr(module, f"{name.capitalize()}Command"), name)
 
 
 class _Commands(Mapping[str, click.Command]):
-    """Every command by its name, built when it is first asked for."""
+    """Name → command, which is built when it is first used."""
 
     def __getitem__(self, name: str) -> click.Command:
         return _load_command(name)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(_HOMES)
+        return iter(_MODULE_OF_COMMAND)
 
     def __len__(self) -> int:
-        return len(_HOMES)
+        return len(_MODULE_OF_COMMAND)
 
 
 class _Group(click.Group):
-    """Commands that end with tmsopt's own messages, at work or while click reads the words."""
+    """Commands that end with tmsopt's own messages, whether they run or click still reads the command line."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)
 
-    def make_context(self, info_name: str | None, args: list[str], *more: Any, **extra: Any) -> click.Context:
-        """Keep the words for a report, and refuse those that a program may give but no shell."""
+    def make_context(self, info_name: str | None, args: list[str], *arguments: Any, **extra: Any) -> click.Context:
+        """Save the words for a report, and refuse words that only a program can pass, not a shell."""
         with report_end():
             for word in args:
                 try:
@@ -99,8 +99,8 @@ class _Group(click.Group):
                 if not is_accepted:
                     accepted = "words without NUL, in the encoding of file names"
                     raise click.UsageError(f"found {word!r}; accepted: {accepted}")
-            words = tuple(args)  # click takes them from the list
-            context = super().make_context(info_name, args, *more, **extra)
+            words = tuple(args)  # copied, because click removes them from the list
+            context = super().make_context(info_name, args, *arguments, **extra)
             context.meta[WORDS] = words
             return context
 
@@ -124,16 +124,16 @@ class _Group(click.Group):
                 click.echo(f"{error}{_offer_example(error)}", err=True)
                 sys.exit(BAD_INPUT)
             except RuntimeError as error:
-                found = getattr(error, "solution", None)  # of NotSolved, whose module takes long to load
-                if found is None:
+                solution = getattr(error, "solution", None)  # NotSolved has it; importing that class takes long
+                if solution is None:
                     raise
-                status = found.status.replace("_", " ")
-                click.echo(f"{found.problem.title}: {status}; there is no design to look at", err=True)
-                sys.exit(STATUSES[found.status])
+                status = solution.status.replace("_", " ")
+                click.echo(f"{solution.problem.title}: {status}; there is no design to look at", err=True)
+                sys.exit(STATUSES[solution.status])
 
 
 def _offer_example(error: InputError) -> str:
-    """How to get a missing file that has the name of an example; else empty."""
+    """Say how to get a missing file if it has the name of an example; else empty."""
     fault = error.faults[0]
     if not fault.message.startswith("no such file"):
         return ""
@@ -158,7 +158,7 @@ def _offer_example(error: InputError) -> str:
 @click.option("--version", is_flag=True, help="Show the version and exit.")
 @click.option("--json", is_flag=True, help="With --version: also those of Python and the libraries.")
 @click.pass_context
-def every(ctx: click.Context, version: bool, json: bool) -> None:
+def command_group(ctx: click.Context, version: bool, json: bool) -> None:
     """Design self-stable bicycles under your own constraints, and find exceptional points.
 
     \b
@@ -177,8 +177,8 @@ def every(ctx: click.Context, version: bool, json: bool) -> None:
         raise click.NoSuchOption("--json", possibilities=["--version"], ctx=ctx)
     if ctx.invoked_subcommand is None:
         ctx.fail("Missing command.")
-    # It may find no folder for its cache: figures stay the same.
+    # Matplotlib warns if it finds no folder for its cache, which does not change figures.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 
-every.params.append(colour_option())
+command_group.params.append(colour_option())

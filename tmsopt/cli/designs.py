@@ -34,7 +34,7 @@ _KEYS = (
     "verdict_is_exact multiplicity_is_exact defective geometric_multiplicity roots eigenfrequencies structure active "
     "violations missed_as_stored bound starts seconds inertia_margin relaxation worst_case notes interrupted"
 )
-"""Keys of JSON without --full: the contract."""
+"""Keys of the JSON without --full, which other programs rely on."""
 
 _FRONT = "is for one design, and the file asks for a front; write minimize with one of the expressions"
 _NO_FRONT = 'is for a front; write pareto = ["abscissa", "Fr"] under [objective], or leave the option out'
@@ -104,7 +104,7 @@ class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
             try:
                 front = tmsopt.pareto(problem, **self.search, **self.select("points workers"))
             except tmsopt.NotSolved as error:
-                return replace(self._show(error.solution, *scale), without="csv plot")
+                return replace(self._show(error.solution, *scale), skipped_options="csv plot")
             figure = partial(tmsopt.plots.front_figure, front)
             status = INTERRUPTED if front.interrupted else 0
             return Reply(front, status, None, self._level, figure)
@@ -123,7 +123,7 @@ class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
         si = convert_to_si(solution, w, m_B)
         options = {"si": si} if self.wheelbase or self.rear_mass else {}
         try:
-            shown = self._make_json(solution) if self.json else make_document(solution, self._level, **options)
+            answer = self._make_json(solution) if self.json else make_document(solution, self._level, **options)
         except KeyboardInterrupt:
             return self._show(replace(solution, interrupted=True), w, m_B)
 
@@ -132,20 +132,20 @@ class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
             growth = tmsopt.growth(solution, over=self.over, progress=progress_listener())
             return tmsopt.plots.growth_figure(growth, solution.problem.title, speed)
 
-        without = "" if math.isfinite(solution.abscissa) else "plot"
-        if self.plot and without:
+        skipped_options = "" if math.isfinite(solution.abscissa) else "plot"
+        if self.plot and skipped_options:
             click.echo("--plot: nothing to draw, a root is at infinity", err=True)
         status = INTERRUPTED if solution.interrupted else STATUSES[solution.status]
-        return Reply(solution, status, shown, self._level, draw, without=without, shown=shown)
+        return Reply(solution, status, answer, self._level, draw, skipped_options=skipped_options, content=answer)
 
     def _make_json(self, solution: "tmsopt.Solution") -> dict[str, Any]:
-        """The keys of the contract; with --full all of them, and what the analysis finds."""
+        """The JSON of a solution: the keys of `_KEYS`; with --full all keys, and the results of the analysis."""
         data = solution.to_json()
         if not self.full:
             return {name: value for name, value in data.items() if name in _KEYS.split()}
         with solution.analysis.report_progress(progress_listener()) as analysis:
-            found = {"meaning": analysis.full_explanation, "robustness": analysis.boundaries}
-            data |= {name: value.to_json() for name, value in found.items() if value}
+            sections = {"meaning": analysis.full_explanation, "robustness": analysis.boundaries}
+            data |= {name: value.to_json() for name, value in sections.items() if value}
             diagnoses = [diagnosis.to_json() for diagnosis in analysis.diagnoses]
         return data | ({"diagnosis": diagnoses} if diagnoses else {})
 
@@ -235,14 +235,14 @@ class DiagnoseCommand(WithSearch, WithPlot, OnFile):
 
     def run(self) -> Reply:
         solution = tmsopt.solve(self.file, **self.search)
-        found = tmsopt.diagnose(solution, progress=progress_listener())
-        data = {"status": solution.status, "diagnoses": [diagnosis.to_json() for diagnosis in found]}
+        diagnoses = tmsopt.diagnose(solution, progress=progress_listener())
+        data = {"status": solution.status, "diagnoses": [diagnosis.to_json() for diagnosis in diagnoses]}
         data = solution.problem.posed.heading | data
-        if found:
-            return Reply(found[0], 0, data, "full", shown=found)
+        if diagnoses:
+            return Reply(diagnoses[0], 0, data, "full", content=diagnoses)
         if self.plot:
             click.echo("--plot: nothing to draw, no root is multiple", err=True)
-        return Reply("no root of this solution is multiple, so none splits", 0, data, without="plot")
+        return Reply("no root of this solution is multiple, so none splits", 0, data, skipped_options="plot")
 
 
 def _parse_range(text: str) -> tuple[float, float]:
@@ -303,9 +303,9 @@ class SimulateCommand(WithCsv, WithPage, WithPlot, OnFile):
         self.refuse_useless((not self.csv, "path", "says what --csv writes; add --csv FILE"))
         problem = tmsopt.load(self.file)
         note_scenarios(problem.posed, self.at)
-        given = self.select("lean steer push lean_push noise seed seconds points")
+        options = self.select("lean steer push lean_push noise seed seconds points")
         states: Any = {"start": self.start or None, "at": self.at or None}
-        motion = tmsopt.simulate(problem, **states, **given, progress=progress_listener())
+        motion = tmsopt.simulate(problem, **states, **options, progress=progress_listener())
         draw = partial(tmsopt.plots.motion_figure, motion)
         return Reply(motion, draw=draw, write_csv=partial(motion.write_csv, whole=self.path))
 
@@ -331,18 +331,18 @@ class TraceCommand(WithSearch, WithCsv, WithPage, WithPlot, OnFile):
         problem = take_nominal(tmsopt.load(self.file).posed)
         if self.axes:
             _check_plane(self.axes, problem.free)
-        found = tmsopt.trace(problem, self.pattern, step=self.step, **self.search)
-        if not found.branches:
-            click.echo(f"no {found.pattern} found in the box; widen it, or try more --starts", err=True)
-            return Reply(found, INFEASIBLE, without="csv plot")
-        axes = self.axes or found.varying[:2]
+        result = tmsopt.trace(problem, self.pattern, step=self.step, **self.search)
+        if not result.branches:
+            click.echo(f"no {result.pattern} found in the box; widen it, or try more --starts", err=True)
+            return Reply(result, INFEASIBLE, skipped_options="csv plot")
+        axes = self.axes or result.varying[:2]
         if self.plot:
             _check_plane(axes, problem.free)
-        return Reply(found, draw=partial(tmsopt.plots.trace_figure, found, *axes))
+        return Reply(result, draw=partial(tmsopt.plots.trace_figure, result, *axes))
 
 
 def _check_plane(names: Sequence[str], free: Mapping[str, Any]) -> None:
-    """Refuse anything but two free parameters."""
+    """Check that the names are two different free parameters."""
     if len(names) != 2 or len({*names}) != 2 or not {*names} <= {*free}:
-        found, accepted = ", ".join(names), ", ".join(free)
-        raise input_error(f"found {found}; accepted: two of the free parameters ({accepted})", "--axes")
+        names_text, accepted = ", ".join(names), ", ".join(free)
+        raise input_error(f"found {names_text}; accepted: two of the free parameters ({accepted})", "--axes")

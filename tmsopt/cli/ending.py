@@ -1,8 +1,8 @@
-"""How commands end from outside: signals, and streams that take no more. Only this module knows of them.
+"""How a command ends early: by signals, or because a stream accepts no more text. Only this module handles them.
 
-The first signal raises KeyboardInterrupt, whatever the signal, so that work that has something in hand leaves it. A
-second one, half a second later or more, ends everything; a second after it the process exits without a word. The exit
-status is that of the signal in any case.
+The first signal, of any kind, raises KeyboardInterrupt, so that a search can return its best result. A second signal,
+at least half a second later, ends the program; if it takes longer than one second, the process exits at once. The exit
+status is always that of the first signal.
 """
 
 import atexit
@@ -22,25 +22,25 @@ from typing import Any, TextIO, cast
 from tmsopt.cli.terminal import close_progress, hide_progress
 
 BAD_INPUT, INFEASIBLE, NOT_CONVERGED, INTERRUPTED, UNREAD = 2, 3, 4, 130, 141
-"""Exit statuses; `UNREAD` says, as of other programs, that the reader of the answer is gone."""
+"""Exit statuses. `UNREAD`: the program that reads the answer has ended; other programs use this status too."""
 
 STATUSES = {"optimal": 0, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERGED}
 """Status of a solution → exit status."""
 
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _LOADING = {getattr(ExtensionFileLoader, name).__code__ for name in ("create_module", "exec_module")}
-_CASADI = "casadi.casadi"  # its wrappers in Python: compiled code that calls Python drops exceptions there
-_NO_ROOM = {errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG}
-_SOON = 0.01  # seconds until a signal is tried again
+_CASADI = "casadi.casadi"  # its wrappers in Python; compiled code calls them, and loses exceptions that they raise
+_WRITE_ERRORS = {errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG}
+_RETRY_SECONDS = 0.01  # seconds until a signal is tried again
 _AGAIN = 0.5  # seconds in which timeout(1) sends one signal twice, to a process and to its group
-_LEFT = 1.0  # seconds for tidying up after a second signal
+_CLEANUP_SECONDS = 1.0  # seconds for tidying up after a second signal
 
 
 class Signals:
-    """The signals that one command receives.
+    """Handles the signals that a command receives.
 
     Attributes:
-        status: of a program that the first one ended; 0 before.
+        status: exit status after the first signal; 0 before it.
     """
 
     def __init__(self) -> None:
@@ -59,7 +59,7 @@ class Signals:
             raise SystemExit(self.status)
 
     def interrupt(self, _number: int, frame: FrameType | None) -> None:
-        """Raise the interrupt that is due, but later while compiled modules load or CasADi calls, which lose it."""
+        """Raise the interrupt that is due; try again later while compiled code runs that would lose it."""
         if not self._due or self._held:
             return
         if _loses_exceptions(frame) and hasattr(signal, "setitimer"):
@@ -69,7 +69,7 @@ class Signals:
         raise KeyboardInterrupt
 
     def recover(self, event: Any) -> None:
-        """Raise an interrupt again that Python could not raise where it was; the hook of unraisable exceptions."""
+        """Raise an interrupt again that Python could not raise; used as the hook for unraisable exceptions."""
         if not self.status or not isinstance(event.exc_value, KeyboardInterrupt):
             sys.__unraisablehook__(event)
         elif hasattr(signal, "setitimer"):
@@ -78,7 +78,7 @@ class Signals:
 
     @contextmanager
     def hold(self) -> Iterator[None]:
-        """Let the first signal wait."""
+        """Delay the interrupt of the first signal until the context ends."""
         self._held = True
         try:
             yield
@@ -88,56 +88,56 @@ class Signals:
 
     def _try_again(self) -> None:
         signal.signal(signal.SIGALRM, self.interrupt)
-        signal.setitimer(signal.ITIMER_REAL, _SOON)
+        signal.setitimer(signal.ITIMER_REAL, _RETRY_SECONDS)
 
     def _exit_soon(self) -> None:
-        time.sleep(_LEFT)
+        time.sleep(_CLEANUP_SECONDS)
         erasing = threading.Thread(target=close_progress, daemon=True)
         erasing.start()
-        erasing.join(_LEFT)  # a terminal that was stopped takes nothing
+        erasing.join(_CLEANUP_SECONDS)  # a limit, because a stopped terminal never accepts the text
         os._exit(self.status)
 
 
-_HEARD = Signals()
+_HANDLER = Signals()
 
-hold_signals = _HEARD.hold
-"""A context in which an answer is written as a whole: the first signal waits."""
+hold_signals = _HANDLER.hold
+"""A context in which an answer is written completely, before the first signal interrupts the command."""
 
 
 @contextmanager
 def handle_signals(for_good: bool) -> Iterator[Signals]:
-    """Handle signals, but for those that the caller of this program has it ignore.
+    """Handle signals in a context, except signals that the caller of this program has set to be ignored.
 
     Args:
-        for_good: the process ends afterwards, and later signals do not change its status.
+        for_good: whether the process ends afterwards; then later signals do not change its exit status.
     """
-    _HEARD.reset()
+    _HANDLER.reset()
     if threading.current_thread() is not threading.main_thread():
-        yield _HEARD
+        yield _HANDLER
         return
-    found = {number: signal.getsignal(number) for number in _SIGNALS}
-    before = {number: handler for number, handler in found.items() if handler not in (signal.SIG_IGN, None)}
-    hook, sys.unraisablehook = sys.unraisablehook, _HEARD.recover
-    for number in before:
-        signal.signal(number, _HEARD.handle)
+    handlers = {number: signal.getsignal(number) for number in _SIGNALS}
+    old_handlers = {number: handler for number, handler in handlers.items() if handler not in (signal.SIG_IGN, None)}
+    hook, sys.unraisablehook = sys.unraisablehook, _HANDLER.recover
+    for number in old_handlers:
+        signal.signal(number, _HANDLER.handle)
     try:
-        yield _HEARD
+        yield _HANDLER
     finally:
-        for number, handler in before.items():
+        for number, handler in old_handlers.items():
             signal.signal(number, signal.SIG_IGN if for_good else handler)
         sys.unraisablehook = hook
 
 
 def exit_now(status: int) -> None:
-    """End the process. Python itself would wait for threads such as a compiler; and after an interrupted exec, as of
-    dataclasses while modules load, it would end by SIGINT whatever the status."""
+    """End the process at once. Python itself would wait for threads, and it would end by SIGINT, whatever the status,
+    if the interrupt came in an `exec`, which dataclasses use while modules load."""
     atexit._run_exitfuncs()
     os._exit(status)
 
 
 @contextmanager
 def report_end() -> Iterator[None]:
-    """Turn an end from outside into one line on stderr and an exit status."""
+    """Report an interrupt or a failed stream by one line on stderr and an exit status."""
     try:
         yield
     except KeyboardInterrupt:
@@ -149,7 +149,7 @@ def report_end() -> Iterator[None]:
         reason = error.strerror or error
         if error.filename:
             text = f"'{error.filename}' cannot be read or written: {reason}"
-        elif error.errno in _NO_ROOM:
+        elif error.errno in _WRITE_ERRORS:
             text = f"the answer cannot be written: {reason}; give a file or a device with room"
         else:
             text = f"the system refuses what is needed: {reason}"
@@ -158,10 +158,10 @@ def report_end() -> Iterator[None]:
 
 
 class _Stream:
-    """A stream before whose text the progress line is erased.
+    """A stream that erases the progress line before it writes text.
 
-    Attributes:
-        ignored: exceptions that do not matter: a lost diagnostic must not cost the answer.
+    Args:
+        ignored: exceptions that are ignored, because a lost diagnostic must not lose the answer.
     """
 
     def __init__(self, stream: Any, *ignored: type[Exception]) -> None:
@@ -184,28 +184,29 @@ class _Stream:
 
 @contextmanager
 def open_streams() -> Iterator[TextIO]:
-    """Streams that exist and take every character; gives stderr itself.
+    """Make the standard streams exist and accept every character; yield the original stderr.
 
-    A stream that was closed when the program began reads as empty, drops diagnostics, and refuses an answer. Otherwise
-    the next file that opens would take its number, and receive the text.
+    A stream that was closed when the program began is replaced: stdin is empty, stderr drops its text, and stdout
+    raises an error. Otherwise the next file that is opened would get the number of the stream, and receive its text.
     """
     for number, name, way in ((0, "stdin", os.O_RDONLY), (1, "stdout", os.O_RDONLY), (2, "stderr", os.O_WRONLY)):
         if getattr(sys, name) is None:
-            handle = os.open(os.devnull, way)  # the least free number, which is that of the stream
+            handle = os.open(os.devnull, way)  # gets the smallest free number, which is that of the closed stream
             setattr(sys, name, os.fdopen(handle, "w" if number else "r", encoding="utf-8"))
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")  # a narrow encoding must not lose a result
-    given = out = sys.stdout
-    if isinstance(getattr(given, "buffer", None), io.RawIOBase):  # python -u loses the rest of what a signal interrupts
-        out = os.fdopen(given.fileno(), "w", encoding=given.encoding, errors="replace", closefd=False)
+            stream.reconfigure(errors="replace")  # an encoding without some characters must not lose a result
+    original = out = sys.stdout
+    # With python -u, a write that a signal interrupts would lose the rest of its text.
+    if isinstance(getattr(original, "buffer", None), io.RawIOBase):
+        out = os.fdopen(original.fileno(), "w", encoding=original.encoding, errors="replace", closefd=False)
     err = sys.stderr
     sys.stdout = cast(TextIO, _Stream(out))
     sys.stderr = cast(TextIO, _Stream(err, OSError, ValueError))
     try:
         yield err
     finally:
-        sys.stdout, sys.stderr = given, err
+        sys.stdout, sys.stderr = original, err
         for stream in (out, err):
             try:
                 stream.flush()

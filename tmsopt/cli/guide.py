@@ -1,5 +1,5 @@
-"""Files to start from and what they mean, the paper: `tmsopt new`, `example`, `describe`, `schema`, `convert`,
-`import`, `figure`, `verify`."""
+"""Commands that make or explain files, or recompute the paper: `tmsopt new`, `example`, `describe`, `schema`,
+`convert`, `import`, `figure`, `verify`."""
 
 from collections.abc import Sequence
 from contextlib import closing
@@ -95,8 +95,8 @@ class DescribeCommand(Command):
     json: bool = option("Write JSON to stdout instead of text.")
 
     def run(self) -> None:
-        found = tmsopt.describe(self.what)
-        answer(self.json, found, found.to_json)
+        description = tmsopt.describe(self.what)
+        answer(self.json, description, description.to_json)
 
 
 class SchemaCommand(Command):
@@ -181,21 +181,21 @@ class FigureCommand(Command):
 
         if not (self.name or self.list):  # no label of the paper is empty either
             raise input_error(f"missing; accepted: {' '.join(GALLERY)} all", "NAME")
-        every = self.list or self.name == "all"
-        items = [*GALLERY.values()] if every else [find(str(self.name))]
+        is_for_all = self.list or self.name == "all"
+        items = [*GALLERY.values()] if is_for_all else [find(str(self.name))]
         data = [{"name": item.name, "alias": item.alias, "caption": item.caption} for item in items]
         if not self.list:
-            files = self._choose_files([f"{item.name}.{self.format or 'png'}" for item in items], every)
+            files = self._choose_files([f"{item.name}.{self.format or 'png'}" for item in items], is_for_all)
             _draw_items(items, files)
-            data = [{**one, "file": str(path)} for one, path in zip(data, files, strict=True)]
+            data = [{**item_data, "file": str(path)} for item_data, path in zip(data, files, strict=True)]
         if self.json or self.list:
             text = "\n".join(map(_describe_item, items))
             answer(self.json, text, lambda: {"schema": 1, "figures": data})
 
-    def _choose_files(self, names: Sequence[str], every: bool) -> Sequence[Path]:
-        """The files to write, unless one of them cannot be."""
+    def _choose_files(self, names: Sequence[str], is_for_all: bool) -> Sequence[Path]:
+        """The files to write; raise InputError if one of them cannot be written."""
         files = [self.output or Path(names[0])]
-        if every:
+        if is_for_all:
             folder = self.output or Path()
             try:
                 folder.mkdir(parents=True, exist_ok=True)
@@ -216,12 +216,12 @@ def _draw_items(items: Sequence[Any], files: Sequence[Path]) -> None:
     from tmsopt.plots.paper import pictures
 
     steps = start_steps(progress_listener(), "drawing", "figure")
-    with closing(pictures(items, [path.suffix[1:].lower() for path in files])) as drawn:
-        for done, (k, picture) in enumerate(drawn, start=1):
+    with closing(pictures(items, [path.suffix[1:].lower() for path in files])) as finished_pictures:
+        for count, (k, picture) in enumerate(finished_pictures, start=1):
             with report_writing("--output", files[k]), write_atomic(files[k]) as temporary:
                 temporary.write_bytes(picture)
             if steps:
-                steps(done, len(items), items[k].name)
+                steps(count, len(items), items[k].name)
 
 
 class VerifyCommand(WithPlot):

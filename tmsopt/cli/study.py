@@ -44,21 +44,21 @@ class StudyCommand(WithPage, WithPlot, OnFile):
     def run(self) -> int:
         from tmsopt.studies import check_export, load_study
 
-        alone = "has no effect with --row, which solves one row and keeps nothing; leave one of the two out"
+        no_effect = "has no effect with --row, which solves one row and keeps nothing; leave one of the two out"
         self.refuse_useless(
             (self.scheduler, "workers", "is for processes of this machine; leave it out with --scheduler"),
-            (self.row is not None, "store fresh export plot report workers scheduler", alone),
+            (self.row is not None, "store fresh export plot report workers scheduler", no_effect),
         )
         for target in self.export:
             check_export(target)
         path = self.store or Path(f"{self.file.stem}.sqlite")
         if self.row is not None:
-            self._answer_row(_plan_rows(load_study(self.file)), self.row)
+            self._answer_row(_prepare_study(load_study(self.file)), self.row)
             return 0
         check_output("--store", path, (path.suffix.lstrip(".").lower(),))
-        stated = load_study(self.file)
-        self._check_apart(path)
-        study = _plan_rows(stated, None if self.fresh else path)
+        request = load_study(self.file)
+        self._check_distinct_files(path)
+        study = _prepare_study(request, None if self.fresh else path)
         path = Path(realpath(path))
         results, is_stopped = self._solve_rows(study, path)
         with hold_signals():
@@ -70,33 +70,33 @@ class StudyCommand(WithPage, WithPlot, OnFile):
             click.echo(f"stopped: the rows solved so far are in {path}; the same command goes on", err=True)
         return INTERRUPTED if is_stopped else 0
 
-    def _check_apart(self, store: Path) -> None:
-        """Refuse to write a file twice, or one that the study is read from."""
-        taken = {realpath(path): "what the study is read from" for path in self._list_files(with_rows=True)}
+    def _check_distinct_files(self, store: Path) -> None:
+        """Check that no file is written twice, and that no file of the study is overwritten."""
+        uses = {realpath(path): "what the study is read from" for path in self._list_files(with_rows=True)}
         exports = [("--export", target) for target in self.export]
         for name, path in [("--store", store), *exports, ("--plot", self.plot), ("--report", self.report)]:
-            if path and (place := realpath(path)) in taken:
-                raise input_error(f"'{path}' is {taken[place]}; give another name", name)
+            if path and (real_path := realpath(path)) in uses:
+                raise input_error(f"'{path}' is {uses[real_path]}; give another name", name)
             if path:
-                taken[place] = f"what {name} writes"
+                uses[real_path] = f"what {name} writes"
 
     def _list_files(self, with_rows: bool) -> list[Path]:
-        """The study, and the problem and the table of rows if it names them."""
+        """The files of the study: its own, and those of its problem and of its rows if it names them."""
         tables = tomllib.loads(read_text(str(self.file), "TOML study file"))
-        named = [tables.get("problem"), tables.get("study", {}).get("csv") if with_rows else None]
-        return [self.file, *(self.file.parent / name for name in named if isinstance(name, str))]
+        names = [tables.get("problem"), tables.get("study", {}).get("csv") if with_rows else None]
+        return [self.file, *(self.file.parent / name for name in names if isinstance(name, str))]
 
     def _solve_rows(self, study: "tmsopt.Study", path: Path) -> "tuple[tmsopt.Results, bool]":
-        """The study with its rows, and whether it was stopped on the way."""
+        """The study with its rows, and whether it was stopped before its end."""
         from tmsopt.executor import EngineError
         from tmsopt.studies import read_results
 
-        done: list[float] = []  # rows, at each report of progress
+        row_counts: list[float] = []  # number of rows at each report of progress
         listener = progress_listener()
 
         def update(progress: Progress) -> None:
             if progress.unit == "row" and math.isfinite(progress.most):
-                done.append(progress.done)
+                row_counts.append(progress.done)
             if listener:
                 listener(progress)
 
@@ -104,9 +104,9 @@ class StudyCommand(WithPage, WithPlot, OnFile):
         try:
             return tmsopt.run_study(study, path, fresh=self.fresh, progress=update, **engine), False
         except KeyboardInterrupt:
-            if not done:  # before the first row
+            if not row_counts:  # it was stopped before the first row
                 raise
-            return replace(read_results(study, path), found=int(done[0])), True
+            return replace(read_results(study, path), found=int(row_counts[0])), True
         except EngineError as error:
             click.echo(f"{error}; the rows solved so far are in {path}", err=True)
             sys.exit(BAD_INPUT)
@@ -121,30 +121,30 @@ class StudyCommand(WithPage, WithPlot, OnFile):
                 run |= {"rows_solved": solved, "seconds": round(seconds, 4), "engine": results.engine}
             answer_rows(results.to_json(table=False) | {"run": run}, "table", results.rows)
             return
-        shown: list[Any] = [results]
+        content: list[Any] = [results]
         if solved:
             rate = solved / max(seconds, 1e-9)
             engine = f"{rate:.3g} a second, {results.engine}"
-            shown.append(f"{solved} rows solved in {seconds:.3g} s, {engine}; store: {path}")
-        answer(False, shown, dict)
+            content.append(f"{solved} rows solved in {seconds:.3g} s, {engine}; store: {path}")
+        answer(False, content, dict)
 
     def _answer_row(self, study: "tmsopt.Study", number: int) -> None:
         from tmsopt.documents import describe_row
         from tmsopt.studies import solve_row
 
         show_step("solving the row")
-        solved = solve_row(study, number)
-        found = {"solution": solved.solution} if solved.solution is not None else {}
-        data = {"schema": 1, **solved.row.to_json(), **{name: one.to_json() for name, one in found.items()}}
-        answer(self.json, [describe_row(study, solved.row), *found.values()], lambda: data)
+        solved_row = solve_row(study, number)
+        results = {"solution": solved_row.solution} if solved_row.solution is not None else {}
+        data = {"schema": 1, **solved_row.row.to_json(), **{name: result.to_json() for name, result in results.items()}}
+        answer(self.json, [describe_row(study, solved_row.row), *results.values()], lambda: data)
 
 
-def _plan_rows(stated: "tmsopt.Study | tmsopt.Sampling", store: Path | None = None) -> "tmsopt.Study":
-    """The study with its rows; the design of a Monte Carlo one is solved first, if its store fits."""
-    from tmsopt.studies import plan_study
+def _prepare_study(request: "tmsopt.Study | tmsopt.Sampling", store: Path | None = None) -> "tmsopt.Study":
+    """The study with its rows; the nominal design of a Monte Carlo study is solved first, if its store matches."""
+    from tmsopt.studies import prepare_study
 
     try:
-        return plan_study(stated, progress_listener(), store)
+        return prepare_study(request, progress_listener(), store)
     except tmsopt.NotSolved as error:
         click.echo(f"there is no design to draw around: {error}", err=True)
         sys.exit(BAD_INPUT)

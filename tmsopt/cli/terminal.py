@@ -1,7 +1,7 @@
-"""The progress line: one line on a terminal's stderr while a command works, erased before anything else is written.
+"""The progress line: one line on stderr of a terminal while a command works. It is erased before other text is written.
 
-A thread draws it, so that it appears within a second and its seconds pass whatever the command does, such as loading
-modules. Rich's Live takes longer to load than all of this, hides the cursor, and ends its line with a line feed.
+A thread draws it, so that it appears within a second, and its seconds are counted whatever the command does. `Live` of
+Rich is not used, because it takes long to load, hides the cursor, and ends its line with a line feed.
 """
 
 import math
@@ -14,8 +14,8 @@ from typing import Any
 
 from tmsopt.progress import Listener, Progress
 
-_FIRST, _NEXT = 0.4, 0.1  # seconds until the line is drawn first, and again
-_WIDTH = 80  # columns of a terminal that does not know its own
+_FIRST_DELAY, _REDRAW_DELAY = 0.4, 0.1  # seconds until the line is drawn for the first time, and drawn again
+_WIDTH = 80  # columns of a terminal whose width is unknown
 _ERASE = "\r\033[K"
 _MINUTE, _HOUR = 60, 3600
 
@@ -26,7 +26,7 @@ class _Line:
     def __init__(self, stream: Any) -> None:
         self._stream, self._lock, self._closed = stream, threading.RLock(), threading.Event()
         self._progress, self._since = Progress("starting"), time.perf_counter()
-        self._due, self._is_drawn, self._holders = self._since + _FIRST, False, 0
+        self._due, self._is_drawn, self._holders = self._since + _FIRST_DELAY, False, 0
         threading.Thread(target=self._keep_drawing, daemon=True).start()
 
     def update(self, progress: Progress) -> None:
@@ -35,26 +35,26 @@ class _Line:
             self._draw()
 
     def hold(self, count: int) -> None:
-        """Erase the line; it comes back when all holders have let go and the work goes on."""
+        """Add `count` holders and erase the line; it is drawn again when there are no holders."""
         with self._lock:
             self._holders += count
             if self._is_drawn:
                 self._write(_ERASE)
-            self._is_drawn, self._due = False, max(self._due, time.perf_counter() + _NEXT)
+            self._is_drawn, self._due = False, max(self._due, time.perf_counter() + _REDRAW_DELAY)
 
     def close(self) -> None:
         self._closed.set()
         self.hold(1)
 
     def _keep_drawing(self) -> None:
-        while not self._closed.wait(_NEXT):
+        while not self._closed.wait(_REDRAW_DELAY):
             self._draw()
 
     def _draw(self) -> None:
         with self._lock:
             now = time.perf_counter()
             if now >= self._due and not self._holders:
-                self._due, self._is_drawn = now + _NEXT, True
+                self._due, self._is_drawn = now + _REDRAW_DELAY, True
                 text = describe_progress(self._progress, now - self._since, count_columns(self._stream) - 1)
                 self._write(f"\r{text}\033[K")
 
@@ -64,7 +64,7 @@ class _Line:
             self._stream.flush()
 
 
-_LINES: list[_Line] = []  # of this command, after those of the commands that called it
+_OPEN_LINES: list[_Line] = []  # the last line is that of this command; the others are of commands that called it
 
 
 @contextmanager
@@ -73,34 +73,34 @@ def show_progress(stream: Any) -> Iterator[None]:
     if not stream.isatty() or os.environ.get("TERM") == "dumb":
         yield
         return
-    _LINES.append(_Line(stream))
+    _OPEN_LINES.append(_Line(stream))
     try:
         yield
     finally:
-        _LINES.pop().close()
+        _OPEN_LINES.pop().close()
 
 
 def close_progress() -> None:
-    """Erase the line for good, because the process ends."""
-    for line in _LINES:
+    """Erase all lines, because the process ends."""
+    for line in _OPEN_LINES:
         line.close()
 
 
 def progress_listener() -> Listener | None:
-    """A function for the `progress` of tmsopt's verbs; None if nobody looks."""
-    return _LINES[-1].update if _LINES else None
+    """A function for the argument `progress` of tmsopt's functions; None if no line is shown."""
+    return _OPEN_LINES[-1].update if _OPEN_LINES else None
 
 
-def show_step(what: str) -> None:
-    """Show what the command does next."""
-    if _LINES:
-        _LINES[-1].update(Progress(what))
+def show_step(step: str) -> None:
+    """Show the next step of the command."""
+    if _OPEN_LINES:
+        _OPEN_LINES[-1].update(Progress(step))
 
 
 @contextmanager
 def hide_progress() -> Iterator[None]:
-    """Show no progress while something else is written."""
-    lines = _LINES[-1:]
+    """Show no progress in a context that writes other text."""
+    lines = _OPEN_LINES[-1:]
     for line in lines:
         line.hold(1)
     try:
@@ -118,23 +118,23 @@ def count_columns(stream: Any) -> int:
         return _WIDTH
 
 
-def describe_progress(told: Progress, since: float = 0.0, width: int = 1000) -> str:
-    """A record as one line, some seconds after it was told; if it does not fit, a shorter one."""
-    has_end, is_counted = math.isfinite(told.most), bool(told.unit) and math.isfinite(told.done)
-    seconds, text = told.seconds + since, told.what
-    if told.unit == "s" and has_end:
-        text += f": {min(told.done + since, told.most):.0f} of {told.most:.0f} s"
+def describe_progress(progress: Progress, elapsed: float = 0.0, width: int = 1000) -> str:
+    """A progress record as one line, `elapsed` seconds after it was sent; a shorter line if it does not fit."""
+    has_end, is_counted = math.isfinite(progress.most), bool(progress.unit) and math.isfinite(progress.done)
+    seconds, text = progress.seconds + elapsed, progress.what
+    if progress.unit == "s" and has_end:
+        text += f": {min(progress.done + elapsed, progress.most):.0f} of {progress.most:.0f} s"
     elif is_counted:
-        text += f": {told.done:,.0f}{f' of {told.most:,.0f}' * has_end} {told.unit}"
-        text += "s" * ((told.most if has_end else told.done) != 1)
-        text += f", about {_format_time(told.left - since)} left" if told.left > since else ""
-    text += f"; {told.note}" if told.note else ""
-    if told.unit != "s" and seconds >= 1:
+        text += f": {progress.done:,.0f}{f' of {progress.most:,.0f}' * has_end} {progress.unit}"
+        text += "s" * ((progress.most if has_end else progress.done) != 1)
+        text += f", about {_format_time(progress.left - elapsed)} left" if progress.left > elapsed else ""
+    text += f"; {progress.note}" if progress.note else ""
+    if progress.unit != "s" and seconds >= 1:
         text += f" ({_format_time(math.floor(seconds))})"
     if len(text) > width and is_counted:
-        most = f"/{told.most:,.0f}" if has_end else f" {told.unit}"
-        left = f", {_format_time(max(told.left - since, 1))} left" if math.isfinite(told.left) else ""
-        text = f"{told.what}: {told.done:,.0f}{most}{left}"
+        end = f"/{progress.most:,.0f}" if has_end else f" {progress.unit}"
+        rest = f", {_format_time(max(progress.left - elapsed, 1))} left" if math.isfinite(progress.left) else ""
+        text = f"{progress.what}: {progress.done:,.0f}{end}{rest}"
     return text[:width]
 
 

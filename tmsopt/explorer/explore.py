@@ -1,4 +1,4 @@
-"""One page for a problem: solved where it asks something, with what is worth going to."""
+"""Writes one page for a problem: its solution, if it has an objective, and other designs to look at."""
 
 import json
 import re
@@ -11,9 +11,9 @@ from os import PathLike
 from typing import Any, Unpack
 
 from tmsopt.errors import input_error
+from tmsopt.explorer.designs import PageDesign, list_designs
 from tmsopt.explorer.javascript import kernel_script, model_script
-from tmsopt.explorer.known import Known, known_designs
-from tmsopt.explorer.subject import subject
+from tmsopt.explorer.page_data import make_page_data
 from tmsopt.files import as_path, write_text
 from tmsopt.problem import Given, Posed, Problem, Solution, pose
 from tmsopt.problem.toml import read_page
@@ -22,24 +22,25 @@ from tmsopt.progress import start_steps
 from tmsopt.records import plain
 from tmsopt.search import solve
 
-_HEIGHT = 900  # pixels of the frame in a notebook: header and the first row of pictures
+_HEIGHT = 900  # height of the frame in a notebook in pixels; it shows the header and the first row of pictures
 _ENDINGS = (".html", ".htm")
 
 _COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)
-_BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # that mean nothing in a style
+_STYLE_BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # blanks that have no meaning in a style sheet
 _TEXT = re.compile(r'("(?:[^"\\]|\\.)*")')
-_AROUND = re.compile(r" ?([=!]==|=>|\*=|[<>]=?|[?:|&*]{1,2}|[-+]=|[=,;{}()\[\]]) ?| ([-+]) (?![-+])")  # in a script
-_PARTS = "numerics state axes chart plane growth bicycle motion controls facts api main"
+_OPERATOR_BLANKS = re.compile(r" ?([=!]==|=>|\*=|[<>]=?|[?:|&*]{1,2}|[-+]=|[=,;{}()\[\]]) ?| ([-+]) (?![-+])")
+"""Operators of a script with the blanks around them."""
+_SCRIPT_NAMES = "numerics state axes chart plane growth bicycle motion controls facts api main"
 
 
 @dataclass(frozen=True, repr=False)
 class Explorer:
-    """A page for a browser, complete in itself.
+    """A page for a browser that needs no other file.
 
     Attributes:
-        problem: that the page is about.
-        solution: its optimum, None where nothing was asked.
-        html: the page, which asks nothing of any server.
+        problem: the problem that the page shows.
+        solution: its optimum; None if the problem has no objective.
+        html: the page, which sends no request to a server.
 
     Example:
         >>> page = tmsopt.explore("problems/ep4.toml")
@@ -54,11 +55,11 @@ class Explorer:
     html: str = field(compare=False)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the page, as a whole or not at all.
+        """Write the page; the file is written completely or not at all.
 
         Raises:
             InputError: for a name that does not end in html or htm.
-            OSError: when the file cannot be written.
+            OSError: if the file cannot be written.
         """
         path = as_path(path, "the file to write")
         if path.suffix.lower() not in _ENDINGS:
@@ -73,17 +74,17 @@ class Explorer:
 
 
 def explore(problem: Given, **options: Unpack[CommonOptions]) -> Explorer:
-    """The page of a problem, which is solved if it asks something; of a solution, without solving it again.
+    """Make the page of a problem, which is solved if it has an objective; a solution is not solved again.
 
-    The page shows one design at a time: of bands and tolerances the nominal one. For a front it minimises the
-    first objective. A design that violates something, or did not converge, is shown as what it is.
+    The page shows one design at a time, at the nominal values of bands and tolerances. For a front, the first objective
+    is minimised. A design that is infeasible, or did not converge, is shown with its status.
 
     Args:
-        problem: or the path of its file, or a solution.
+        problem: a problem, the path of its file, or a solution.
         options: ``starts``, ``seed``, ``linear_solver`` and ``progress``; see `tmsopt.Options`.
 
     Raises:
-        InputError: for a file with faults, and for anything that is no problem.
+        InputError: for a file with faults, or an argument that is not a problem.
 
     Example:
         >>> tmsopt.explore("problems/benchmark.toml").html.startswith("<!DOCTYPE html>")
@@ -91,7 +92,7 @@ def explore(problem: Given, **options: Unpack[CommonOptions]) -> Explorer:
 
     More: docs/how_to/explorer.md
     """
-    told = options.get("progress")
+    listener = options.get("progress")
     model = read_page(problem, "problem").data.get("model") if isinstance(problem, str | PathLike) else None
     posed, solution = pose(problem), problem if isinstance(problem, Solution) else None
     if solution is None:
@@ -99,79 +100,81 @@ def explore(problem: Given, **options: Unpack[CommonOptions]) -> Explorer:
             posed = posed.derive(pareto=(), minimize=posed.pareto[0])
         if posed.sense != "evaluate" or not posed.free:
             solution = solve(posed, throw=False, stability=0.0, **options)
-    start_steps(told, "looking for designs worth going to")
-    designs = known_designs(posed, solution, search=True)
-    start_steps(told, "writing the page")
+    start_steps(listener, "looking for designs worth going to")
+    designs = list_designs(posed, solution, search=True)
+    start_steps(listener, "writing the page")
     html = _write_html(posed, designs, model if isinstance(model, dict) else {}, trace_curves=True)
     return Explorer(posed.problem, solution, html)
 
 
 def page_of(
     design: Problem | Posed | Solution,
-    others: Sequence[tuple[str, Mapping[str, float]]] = (),
+    more_designs: Sequence[tuple[str, Mapping[str, float]]] = (),
     *,
     trace_curves: bool = False,
 ) -> str:
-    """The page of a problem as it stands, or of a solution, as HTML; nothing is searched for it.
+    """The page of a problem or a solution as HTML; no design is searched.
 
     Args:
-        others: names and parameters of more designs to go to; of a problem the page opens at the first.
-        trace_curves: whether to trace what bounds stability around the design that the page opens at.
+        more_designs: names and parameters of more designs; the page of a problem opens with the first of them.
+        trace_curves: whether to trace the boundaries of stability around the design with which the page opens.
     """
     problem, solution = pose(design), design if isinstance(design, Solution) else None
-    return _write_html(problem, known_designs(problem, solution, search=False, others=others), {}, trace_curves)
+    designs = list_designs(problem, solution, search=False, more_designs=more_designs)
+    return _write_html(problem, designs, {}, trace_curves)
 
 
 def frame(html: str, title: str) -> str:
-    """A page within another one, of which it can neither see nor change anything."""
+    """A page in a frame of another page; it can neither read nor change that page."""
     return (
         f'<iframe title="{escape(title or "explorer")}" sandbox="allow-scripts allow-downloads" '
         f'style="width:100%;height:{_HEIGHT}px;border:0" srcdoc="{escape(html)}"></iframe>'
     )
 
 
-# The page as one file: what is the same in every page, with the formulas and the data of this one
+# The page as one file: the parts that are the same in every page, and the formulas and data of one problem
 
 
-def _write_html(problem: Posed, designs: Sequence[Known], model: Mapping[str, Any], trace_curves: bool) -> str:
-    """The page of a problem; arguments as of `subject`."""
+def _write_html(problem: Posed, designs: Sequence[PageDesign], model: Mapping[str, Any], trace_curves: bool) -> str:
+    """The page of a problem; the arguments are those of `make_page_data`."""
     script = model_script(problem)
-    data = subject(problem, designs, script, model, trace_curves) | {"version": version("tmsopt")}
-    own = script.text, kernel_script(problem.model.degree), f"const DATA = {_json(data)};"
-    parts = [*own, *(_read(f"{name}.js") for name in _PARTS.split())]
+    data = make_page_data(problem, designs, script, model, trace_curves) | {"version": version("tmsopt")}
+    page_scripts = script.text, kernel_script(problem.model.degree), f"const DATA = {_format_json(data)};"
+    parts = [*page_scripts, *(_read_minified(f"{name}.js") for name in _SCRIPT_NAMES.split())]
     marks = {
         "<!-- title -->": escape(problem.title or problem.model.title),
-        "/* style */": _BLANKS.sub(r"\1\2", _read("page.css")),
+        "/* style */": _STYLE_BLANKS.sub(r"\1\2", _read_minified("page.css")),
         "/* script */": "\n".join(parts),
     }
-    either = "|".join(map(re.escape, marks))
-    return re.sub(either, lambda mark: marks[mark[0]], _read("page.html"))  # at once: a title may look like a mark
+    pattern = "|".join(map(re.escape, marks))
+    # All marks are replaced at once, because a title may look like a mark.
+    return re.sub(pattern, lambda mark: marks[mark[0]], _read_minified("page.html"))
 
 
-def _read(name: str) -> str:
-    """A file of the page without what only its readers need: indentation, comments, ends of lines, blanks."""
+def _read_minified(name: str) -> str:
+    """A file of the page without indentation, comments, line breaks and blanks that a browser does not need."""
     text = (files("tmsopt.explorer") / "page" / name).read_text(encoding="utf-8")
     lines = [line.strip() for line in text.splitlines()]
     text = re.sub(r" // .*", "", _COMMENT.sub("", "\n".join(lines)))
     if name.endswith(".js"):
-        text = "\n".join(_tight(text.splitlines()))
+        text = "\n".join(_strip_blanks(text.splitlines()))
     return re.sub(r",?\n+(?=[)}\]])|(?<=[,;({\[])\n+", "", re.sub(r"\n{2,}", "\n", text)).strip()
 
 
-def _tight(lines: Sequence[str]) -> Iterator[str]:
-    """Lines of a script without the blanks around operators; those with a template, or of one, as they stand."""
-    inside = False
+def _strip_blanks(lines: Sequence[str]) -> Iterator[str]:
+    """Lines of a script without blanks around operators; lines with a template literal stay unchanged."""
+    is_in_template = False
     for line in lines:
-        inside ^= line.count("`") % 2 == 1
-        if inside or "`" in line:
+        is_in_template ^= line.count("`") % 2 == 1
+        if is_in_template or "`" in line:
             yield line
         else:
             parts = _TEXT.split(line)
-            yield "".join(t if k % 2 else _AROUND.sub(r"\1\2", t) for k, t in enumerate(parts))
+            yield "".join(t if k % 2 else _OPERATOR_BLANKS.sub(r"\1\2", t) for k, t in enumerate(parts))
 
 
-def _json(data: Mapping[str, Any]) -> str:
-    """JSON that no text in it can end or change a script with; a number that does not exist is null."""
+def _format_json(data: Mapping[str, Any]) -> str:
+    """JSON in which no text can end or change the script around it; nan is null."""
     text = json.dumps(plain(data), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     for letter in "<>&\u2028\u2029":
         text = text.replace(letter, f"\\u{ord(letter):04x}")

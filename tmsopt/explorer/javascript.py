@@ -1,6 +1,6 @@
-"""Formulas as JavaScript: every operation as the text that computes it.
+"""Writes formulas as JavaScript: each operation becomes the text that computes it.
 
-Results that are used once stand where they are used, the others get names t0, t1, …; no name comes from a file.
+A result that is used once is written where it is used; the others get the names t0, t1, …. No name comes from a file.
 """
 
 import json
@@ -30,8 +30,8 @@ class Script:
 
     Attributes:
         text: ``const MODEL = {…};``
-        quantities: names of the derived quantities, in the order of what ``MODEL.derived`` fills in.
-        constraints: names of the constraints, which follow them there.
+        quantities: names of the derived quantities, in the order in which ``MODEL.derived`` returns them.
+        constraints: names of the constraints, whose margins follow the quantities there.
     """
 
     text: str
@@ -40,27 +40,27 @@ class Script:
 
 
 def model_script(problem: Posed) -> Script:
-    """The model of a problem: coefficients, derived quantities, margins of constraints, matrices, rate, ride.
+    """The model of a problem: coefficients, derived quantities, margins of constraints, matrices, unit of time, motion.
 
-    Constraints with the robustness radius are left out, which takes a search. The parameters are those of
+    Constraints on the robustness radius are left out, because it needs a search. The parameters are those of
     `problem.parameter_set`, in its order, in SI units and radians.
     """
-    model, of = problem.model, problem.parameter_set
-    coefficients = coefficient_formula(model, of.name)
-    quantities = tuple(q.name for q in (*model.quantities, *of.quantities))
+    model, parameter_set = problem.model, problem.parameter_set
+    coefficients = coefficient_formula(model, parameter_set.name)
+    quantities = tuple(q.name for q in (*model.quantities, *parameter_set.quantities))
     limits = {n: c for n, c in problem.conditions.items() if RADIUS not in c.names}
     derived = [*nodes_of(problem, {n: n for n in quantities}).values()]
     for condition, node in zip(limits.values(), nodes_of(problem, limits).values(), strict=True):
         derived.append(node if condition.sign < 0 or condition.equality else -node)
-    entries = {n: f"x[{k}]" for k, n in enumerate(of.names)}
-    every = entries | {q.name: f"r[{k}]" for k, q in enumerate(ROOT_QUANTITIES)}
-    pencil, size, order = _pencil(problem)
-    rate = trace(lambda p: [math.nan if of.rate is None else of.rate(p)], of.names)
-    ride = trace(partial(_ride, problem), of.names) if is_bicycle(problem) else None
+    entries = {n: f"x[{k}]" for k, n in enumerate(parameter_set.names)}
+    all_inputs = entries | {q.name: f"r[{k}]" for k, q in enumerate(ROOT_QUANTITIES)}
+    pencil, size, order = _make_pencil(problem)
+    rate = trace(lambda p: [math.nan if parameter_set.rate is None else parameter_set.rate(p)], parameter_set.names)
+    ride = trace(partial(_compute_ride, problem), parameter_set.names) if is_bicycle(problem) else None
     parts = [
         f"degree: {model.degree}, size: {size}, order: {order}",
         function("coefficients", ("x", "a"), coefficients, entries),
-        function("derived", ("x", "r", "y"), formula(derived), every),
+        function("derived", ("x", "r", "y"), formula(derived), all_inputs),
         function("pencil", ("x", "m"), pencil, entries) if pencil else "pencil: null",
         function("rate", ("x",), rate, entries, fills=False),
         function("ride", ("x", "y"), ride, entries) if ride else "ride: null",
@@ -75,35 +75,38 @@ def is_bicycle(problem: Posed) -> bool:
     return model.pencil is not None and model.statement is None and "lambda_s" in problem.parameter_set.names
 
 
-def function(name: str, arguments: Sequence[str], asked: Formula, inputs: Mapping[str, str], fills: bool = True) -> str:
-    """A JavaScript function, or a method, that fills the array that it takes last, or returns its one result.
+def function(
+    name: str, arguments: Sequence[str], expression: Formula, inputs: Mapping[str, str], fills: bool = True
+) -> str:
+    """A JavaScript function, or a method, that computes a formula.
 
     Args:
         inputs: name of an input → its text.
+        fills: whether the function writes its results to its last argument, an array; else it returns its only result.
     """
     results: list[str] = []
 
     def name_term(text: str) -> str:
-        results.append(f"t{len(results)}={_bare(text)}")
+        results.append(f"t{len(results)}={_strip_parentheses(text)}")
         return f"t{len(results) - 1}"
 
     operations = {op: partial(_write_operation, template, name_term) for op, template in _OPERATIONS.items()}
-    kind = Kind(operations | {"pow": partial(_power, name_term)}, lambda x: _number(as_double(x)))
-    texts = map(_bare, fold(asked, inputs, kind, name_term))
+    kind = Kind(operations | {"pow": partial(_write_power, name_term)}, lambda x: _format_number(as_double(x)))
+    texts = map(_strip_parentheses, fold(expression, inputs, kind, name_term))
     ends = [f"{arguments[-1]}[{k}]={t};" for k, t in enumerate(texts)] if fills else [f"return {next(texts)};"]
     if results:
         ends = [f"const {','.join(results)};", *ends]
     return "\n".join([f"{name}({', '.join(arguments)}) {{", *ends, "}"])
 
 
-def _number(value: float) -> str:
-    """A double, to the last bit; JSON writes it as JavaScript does, NaN and infinities too."""
+def _format_number(value: float) -> str:
+    """The exact text of a double; JSON writes numbers, NaN and infinities like JavaScript."""
     text = json.dumps(float(value)).removesuffix(".0")
     return f"({text})" if text.startswith("-") else text
 
 
 _POWERS = {"(-1)": "(1/{0})", "3": "({0}*{0}*{0})", "4": "({0}*{0}*({0}*{0}))"}
-"""Small powers, as floats have them."""
+"""Exponent → text of the power, computed like powers of floats in tmsopt."""
 
 _OPERATIONS: Mapping[str, str] = {
     "add": "({0}+{1})",
@@ -123,86 +126,91 @@ _OPERATIONS: Mapping[str, str] = {
     "ratio": "({0}===0?0:{1}===0?NaN:{0}/{1})",
     "positive_part": "(({0}+Math.abs({0}))/2)",
     "negligible": f"(Math.abs({{0}})<={ROUNDING!r}*{{1}})",
-    "min": "Math.min({0},{1})",  # NaN where either is
+    "min": "Math.min({0},{1})",  # NaN if an operand is NaN
     "max": "Math.max({0},{1})",
     **{name: f"Math.{name}({{0}})" for name in ("sqrt", "cbrt", "abs", "sign", "exp", "log")},
     **{name: f"Math.{name}({{0}})" for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
 }
-"""Operations with {0}, {1}, … for their operands; what is not a call stands in parentheses."""
+"""Operation → its text, with {0}, {1}, … for the operands; a text that is not a call has parentheses."""
 
-_LONGEST = 160
-"""Characters of a result that stands where it is used."""
+_MAX_INLINE_LENGTH = 160
+"""Largest number of characters of a result that is written where it is used."""
 
 
-def _pencil(problem: Posed) -> tuple[Formula | None, int, int]:
-    """Entries of the matrices of a model, rows of each, and how many there are less one."""
-    model, of = problem.model, problem.parameter_set
-    if model.pencil is None or model.carrier is not None:  # whose carrier is no motion of the user's
+def _make_pencil(problem: Posed) -> tuple[Formula | None, int, int]:
+    """Entries of the matrices of a model, number of rows of each matrix, and number of matrices minus one."""
+    model, parameter_set = problem.model, problem.parameter_set
+    if (
+        model.pencil is None or model.carrier is not None
+    ):  # the motion of a carrier is not a motion of the user's system
         return None, 0, 0
-    matrices = model.pencil(of.native({n: symbol(n) for n in of.names}))
+    matrices = model.pencil(parameter_set.native({n: symbol(n) for n in parameter_set.names}))
     return formula(e for matrix in matrices for row in matrix for e in row), len(matrices[0]), len(matrices) - 1
 
 
-def _ride(problem: Posed, p: Mapping[str, Any]) -> list[Any]:
-    """Rates of lean and steer after an impulse of steer torque of 1, M⁻¹ (0, 1), and the path of the contacts.
+def _compute_ride(problem: Posed, p: Mapping[str, Any]) -> list[Any]:
+    """Rates of lean and steer after a unit impulse of steer torque, M⁻¹ (0, 1), and the path of the contacts.
 
-    In the model's own unit of time; torque and lengths are those of the file.
+    Time is in the unit of the model; torque and lengths are in those of the file.
     """
-    model, of = problem.model, problem.parameter_set
+    model, parameter_set = problem.model, problem.parameter_set
     assert model.pencil is not None
-    native = of.native(p)
+    native = parameter_set.native(p)
     (a, b), (c, d) = model.feedback(native).mass if model.feedback else model.pencil(native)[0]
-    impulse = 1 if of.rate is None or of.torque is None else of.rate(p) / of.torque(p)
+    rate, torque = parameter_set.rate, parameter_set.torque
+    impulse = 1 if rate is None or torque is None else rate(p) / torque(p)
     length = p["w"] if "w" in p and "w" not in native else 1
-    yaw, yaw_of_rate, speed, ahead, aside = contact_path(native)
+    yaw, yaw_of_rate, speed, forward, lateral = contact_path(native)
     scale = impulse / (a * d - b * c)
-    return [-b * scale, a * scale, yaw, yaw_of_rate, speed * length, ahead * length, aside * length]
+    return [-b * scale, a * scale, yaw, yaw_of_rate, speed * length, forward * length, lateral * length]
 
 
-def _write_operation(template: str, name_term: Callable[[str], str], *given: str) -> str:
-    """The text of an operation; operands that it takes twice, and what is long, are named."""
-    often = [template.count(f"{{{k}}}") > 1 and _is_result(text) for k, text in enumerate(given)]
-    text = template.format(*(name_term(text) if twice else text for text, twice in zip(given, often, strict=True)))
-    return name_term(text) if len(text) > _LONGEST else text
+def _write_operation(template: str, name_term: Callable[[str], str], *operands: str) -> str:
+    """The text of an operation; a name replaces operands that are used twice, and a long result."""
+    is_repeated = [template.count(f"{{{k}}}") > 1 and _is_result(text) for k, text in enumerate(operands)]
+    text = template.format(
+        *(name_term(text) if is_named else text for text, is_named in zip(operands, is_repeated, strict=True))
+    )
+    return name_term(text) if len(text) > _MAX_INLINE_LENGTH else text
 
 
-def _power(name_term: Callable[[str], str], base: str, exponent: str) -> str:
+def _write_power(name_term: Callable[[str], str], base: str, exponent: str) -> str:
     return _write_operation(_POWERS.get(exponent, "Math.pow({0},{1})"), name_term, base, exponent)
 
 
-def _bare(text: str) -> str:
-    """A result where nothing stands around it: without its parentheses."""
+def _strip_parentheses(text: str) -> str:
+    """A result without its outer parentheses, for a place without an operation around it."""
     return text[1:-1] if text.startswith("(") else text
 
 
 def _is_result(text: str) -> bool:
-    """Whether a text is neither a name, nor an entry such as ``x[3]``, nor a number."""
+    """Whether a text is an operation: not a name, an entry such as ``x[3]``, or a number."""
     return re.fullmatch(r"[\w.\[\]]+", text) is None
 
 
-# The elementwise formulas of polynomials: traced, because they have no second home. The names `where` and `one` mean
-# something else in these functions. Those of quartics are taken from `tmsopt.roots.quartics`; the conditions of
-# stability of the lower degrees from `lienard_chipart`.
+# The formulas for roots of polynomials are not written again in JavaScript: the functions of Python are traced. For
+# this, their names `where` and `one` get another meaning. Formulas of quartics are from `tmsopt.roots.quartics`; the
+# conditions of stability for lower degrees are from `lienard_chipart`.
 
 _QUARTIC = 4
 
 
 def kernel_script(degree: int) -> str:
-    """JavaScript functions for polynomials of a degree; arrays are filled, so that nothing is allocated.
+    """JavaScript functions for polynomials of a degree; they write results to arrays, so that no memory is allocated.
 
-    ``factorAbscissa(p, q)``, ``factorDamping(p, q)`` and ``factorRoots(p, q, z)``, real and imaginary parts, of
-    s² + p s + q. Up to degree 4 ``stableBySigns(a0, …)``. Of quartics ``quarticStart(a0, …, f)``, which fills in
-    b1 … b4, p1, q1, p2, q2 and the backward error; ``quarticStep(b1, …, q2, g)``, new factors and their error;
-    ``quarticClass(a0, …)``, the code + 8 × the number of real roots, 64 where a sign is in doubt.
+    For s² + p s + q: ``factorAbscissa(p, q)``, ``factorDamping(p, q)``, and ``factorRoots(p, q, z)``, which writes real
+    and imaginary parts. Up to degree 4: ``stableBySigns(a0, …)``. For quartics: ``quarticStart(a0, …, f)``, for
+    b1 … b4, p1, q1, p2, q2 and the backward error; ``quarticStep(b1, …, q2, g)``, which writes better factors and their
+    error; ``quarticClass(a0, …)``, which is the code + 8 × the number of real roots, or 64 if a sign is uncertain.
     """
     a = [f"a{k}" for k in range(degree + 1)]
     parts = [
-        _trace_function("factorAbscissa", ["p", "q"], lambda p, q: [_OF.abscissa(p, q)]),
-        _trace_function("factorDamping", ["p", "q"], lambda p, q: [_OF.damping_ratio(p, q)]),
-        _trace_function("factorRoots", ["p", "q"], _OF.root_pair, "z"),
+        _trace_function("factorAbscissa", ["p", "q"], lambda p, q: [_FUNCTIONS.abscissa(p, q)]),
+        _trace_function("factorDamping", ["p", "q"], lambda p, q: [_FUNCTIONS.damping_ratio(p, q)]),
+        _trace_function("factorRoots", ["p", "q"], _FUNCTIONS.root_pair, "z"),
     ]
     if degree <= _QUARTIC:
-        is_stable = _OF.stable if degree == _QUARTIC else _is_stable
+        is_stable = _FUNCTIONS.stable if degree == _QUARTIC else _is_stable
         parts.append(_trace_function("stableBySigns", a, lambda *c: [is_stable(*c)]))
     if degree == _QUARTIC:
         rules = f"good: {GOOD}, accepted: {quartic.ACCEPTED}, steps: {quartic.STEPS}"
@@ -216,39 +224,41 @@ def kernel_script(degree: int) -> str:
 
 
 _where = partial(make_node, "choose")
-_KNOWN: dict[str, Any] = {**vars(factors), **vars(signs)}
-for _name, _each in [*_KNOWN.items()]:
-    if isinstance(_each, FunctionType):
-        _KNOWN[_name] = FunctionType(_each.__code__, _KNOWN, _name)  # so that each calls the others here
-_KNOWN |= {"where": _where, "one": lambda condition: _where(condition, 1, 0)}
-_OF = SimpleNamespace(**_KNOWN)
+_NAMESPACE: dict[str, Any] = {**vars(factors), **vars(signs)}
+for _name, _value in [*_NAMESPACE.items()]:
+    if isinstance(_value, FunctionType):
+        _NAMESPACE[_name] = FunctionType(_value.__code__, _NAMESPACE, _name)  # they call each other here
+_NAMESPACE |= {"where": _where, "one": lambda condition: _where(condition, 1, 0)}
+_FUNCTIONS = SimpleNamespace(**_NAMESPACE)
 
 
 def _start_roots(*a: Any) -> Sequence[Any]:
-    monic = _OF.monic(*a)
-    found = _OF.start(*monic)
-    return [*monic, *found, _OF.error(*monic, *found)]
+    monic = _FUNCTIONS.monic(*a)
+    quadratics = _FUNCTIONS.start(*monic)
+    return [*monic, *quadratics, _FUNCTIONS.error(*monic, *quadratics)]
 
 
-def _step_roots(*given: Any) -> list[Any]:
-    found = _OF.newton(*given)
-    return [*found, _OF.error(*given[:4], *found)]
+def _step_roots(*numbers: Any) -> list[Any]:
+    quadratics = _FUNCTIONS.newton(*numbers)
+    return [*quadratics, _FUNCTIONS.error(*numbers[:4], *quadratics)]
 
 
 def _pack_classes(*a: Any) -> list[Any]:
-    kind, count, doubtful = _OF.classes(*a)
+    kind, count, doubtful = _FUNCTIONS.classes(*a)
     return [_where(doubtful, 64.0, kind + 8.0 * count)]
 
 
 def _is_stable(*c: Any) -> Any:
-    """As `tmsopt.roots.is_stable` up to degree 4: the signs of the rounded conditions."""
+    """Like `tmsopt.roots.is_stable` up to degree 4, by the signs of the rounded conditions."""
     up, down = c[0] > 0.0, c[0] < 0.0
     sign = _where(up, 1.0, -1.0)
     conditions = (condition > 0.0 for condition in lienard_chipart([sign * x for x in c]))
     return reduce(operator.and_, conditions, up | down)
 
 
-def _trace_function(name: str, arguments: Sequence[str], compute: Callable[..., Sequence[Any]], into: str = "") -> str:
+def _trace_function(
+    name: str, arguments: Sequence[str], compute: Callable[..., Sequence[Any]], output: str = ""
+) -> str:
     traced = trace(lambda x: compute(*x.values()), arguments)
-    taken = [*arguments, into] if into else arguments
-    return function(f"function {name}", taken, traced, {n: n for n in arguments}, fills=bool(into))
+    all_arguments = [*arguments, output] if output else arguments
+    return function(f"function {name}", all_arguments, traced, {n: n for n in arguments}, fills=bool(output))

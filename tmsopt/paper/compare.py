@@ -1,4 +1,7 @@
-"""Comparison of a numeric optimum with the closed-form laws and with the other formulation of its problem."""
+"""Comparison of a numeric optimum with the closed-form laws, and with a second formulation of its problem.
+
+One formulation minimises an objective; the other one locates the root pattern of the design.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -21,10 +24,10 @@ class Comparison(Tabular):
     """Comparison of a design with the laws of the paper.
 
     Attributes:
-        design: the solution of the problem as stated.
-        laws: one row per law.
-        other: the solution by the other formulation; None without one.
-        reason: why there is no other solution to compare with, else empty.
+        design: the solution of the problem in its own formulation.
+        laws: one row for each law.
+        other: the solution of the other formulation; None if there is none.
+        reason: why there is no solution of the other formulation; else empty.
 
     Example:
         >>> compared = tmsopt.compare("problems/ep4.toml")
@@ -42,25 +45,25 @@ class Comparison(Tabular):
 
     @property
     def differences(self) -> dict[str, float]:
-        """Other formulation minus the design, for every free parameter and the abscissa."""
+        """Every free parameter and the abscissa in the other formulation, minus the value of the design."""
         if self.other is None:
             return {}
         free = {n: self.other.parameters[n] - self.design.parameters[n] for n in self.design.problem.free}
         return {**free, "abscissa": self.other.abscissa - self.design.abscissa}
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """The laws, one per row."""
+        """One record for each law."""
         return (row.to_json() for row in self.laws)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        """Plain data for ``json.dumps``; nan is None."""
         formulations = {"formulation": self.design.formulation} | plain(self, "other differences reason")
         return {"schema": SCHEMA} | plain(self, "design laws") | {"formulations": formulations}
 
 
 @documents_options(CommonOptions)
 def compare(design: Given, **options: Unpack[CommonOptions]) -> Comparison:
-    """Compare a design with the laws of the paper, which hold for skates only, and solve it by the other formulation.
+    """Compare a design with the laws of the paper, which hold only for skates, and solve it in another formulation.
 
     The laws describe one design at one speed. A problem with scenarios or tolerances is solved again without them.
 
@@ -75,37 +78,37 @@ def compare(design: Given, **options: Unpack[CommonOptions]) -> Comparison:
 
     More: docs/explanation/paper.md
     """
-    how = make_options(options)
+    common_options = make_options(options)
     problem = as_solvable(design)
-    one = isinstance(design, Solution) and not (problem.scenarios or problem.tolerances)
-    found = solve_any_status(design if one else problem.nominal, how)
-    other, reason = _other_formulation(found, how)
-    begin(how.progress, "comparing")
-    return Comparison(found, tuple(law_rows(found)) if found.problem.model is tms else (), other, reason)
+    is_reusable = isinstance(design, Solution) and not (problem.scenarios or problem.tolerances)
+    solution = solve_any_status(design if is_reusable else problem.nominal, common_options)
+    other, reason = _solve_other_formulation(solution, common_options)
+    begin(common_options.progress, "comparing")
+    return Comparison(solution, tuple(law_rows(solution)) if solution.problem.model is tms else (), other, reason)
 
 
-def _other_formulation(design: Solution, options: Options) -> tuple[Solution | None, str]:
+def _solve_other_formulation(design: Solution, options: Options) -> tuple[Solution | None, str]:
     problem = design.problem.posed
     if design.status != "optimal":
         return None, f"the design is {design.status}"
     if not problem.free:
         return None, "nothing is free"
     if problem.locate:
-        restated = problem.derive(locate=None, minimize="abscissa", maximize=None, start={})
+        reformulation = problem.derive(locate=None, minimize="abscissa", maximize=None, start={})
     elif design.structure not in PATTERNS:
         return None, f"the structure '{design.structure}' is not a pattern that can be matched"
     else:
-        square = len(problem.free) == PATTERNS[design.structure].codimension and not problem.constraints
-        restated = problem.derive(locate=design.structure, start={})
-        if square:  # several designs may exist; find the one near this
-            restated = restated.derive(minimize=None, maximize=None, start=_round_start(design))
-    other = solve_any_status(restated, options)
+        is_square = len(problem.free) == PATTERNS[design.structure].codimension and not problem.constraints
+        reformulation = problem.derive(locate=design.structure, start={})
+        if is_square:  # several designs may exist; the start selects the one near this design
+            reformulation = reformulation.derive(minimize=None, maximize=None, start=_round_parameters(design))
+    other = solve_any_status(reformulation, options)
     if other.status != "optimal":
         return None, f"the {other.formulation} formulation has the status {other.status}"
     return other, ""
 
 
-def _round_start(design: Solution) -> dict[str, float]:
+def _round_parameters(design: Solution) -> dict[str, float]:
     """The free parameters rounded to two digits, within their ranges."""
     box = design.problem.free
     return {n: min(max(float(f"{design.parameters[n]:.2g}"), low), high) for n, (low, high) in box.items()}

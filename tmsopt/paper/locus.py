@@ -9,14 +9,14 @@ from tmsopt.paper.reference import ReferenceBicycle, table_1
 from tmsopt.problem.problem import Problem
 
 FR_MAX = 5.0
-"""End of the sweeps over Fr."""
+"""Largest Froude number of the root loci."""
 
-_SAME = 1e-6  # distance in Fr of the two double roots into which rounding splits an exceptional point
+_SPLIT_DISTANCE = 1e-6  # rounding splits an exceptional point into two double roots; they are closer than this in Fr
 
 
 @dataclass(frozen=True)
 class LocusRow:
-    """Roots over Fr at one steer axis tilt, for χ_B of the law (first), and for χ_B smaller and larger by `offset`."""
+    """Roots over Fr at one steer axis tilt: first for χ_B of the law, then for χ_B smaller and larger by `offset`."""
 
     bicycle: ReferenceBicycle
     offset: float
@@ -24,7 +24,7 @@ class LocusRow:
 
 
 def table_1_loci() -> tuple[LocusRow, ...]:
-    """The three rows of the paper's figure: tilts of Table 1, χ_B = √2 and close to it, 0 < Fr ≤ 5."""
+    """The three rows of the paper's figure, one for each tilt of Table 1; χ_B is √2 or close to it, 0 < Fr ≤ 5."""
     rows = zip(table_1(), (0.01, 0.01, 0.1), strict=True)
     return tuple(
         LocusRow(b, offset, tuple(sweep_Fr(b, shift) for shift in (0.0, -offset, offset))) for b, offset in rows
@@ -38,8 +38,8 @@ def sweep_Fr(bicycle: ReferenceBicycle, shift: float = 0.0) -> Growth:
 
 
 def multiple_roots(data: Growth) -> Iterator[tuple[str, float, complex]]:
-    """Name, Fr and value of each multiple root: the exceptional point of the design, and every ``EP2``."""
+    """Name, Fr and value of each multiple root: of the design's exceptional point, and of every other ``EP2``."""
     yield from ((data.structure, data.design, complex(r.re, r.im)) for r in data.multiple)
     for event in data.events:
-        if event.kind == "EP2" and abs(event.at - data.design) > _SAME:
+        if event.kind == "EP2" and abs(event.at - data.design) > _SPLIT_DISTANCE:
             yield "EP2", event.at, complex(event.root.re)

@@ -1,4 +1,4 @@
-"""Data of the paper's planes and surface for χ_H = 1: charts, exact boundaries, the EP set."""
+"""Data of the paper's figures for χ_H = 1, planes and a surface: charts, exact boundaries, the EP set."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from tmsopt.tracing.swallowtail import Swallowtail, swallowtail
 from tmsopt.tracing.trace import trace
 
 FR, TILT, CHI_B = (0.01, 5.0), (0.01, 1.5), (1.001, 1.999)
-"""Ranges of the planes; a bicycle with λ_s > 0 can be stable between χ_B = 1 and ζ_B/ζ_H = 2."""
+"""Ranges of the planes. A bicycle with λ_s > 0 can be stable for χ_B between 1 and ζ_B/ζ_H = 2."""
 
 OFF_LAW_CHI_B, OFF_LAW_TILT = -0.1, -0.18
 """Distances from the laws `chib1` and `tls` in Fig. fig2; the tilt in rad."""
@@ -27,12 +27,12 @@ SECTIONS = (0.0, -0.1, 0.5)
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane of two parameters, with all others fixed, and the curves of the laws in it.
+    """A plane of two parameters with the curves of the laws; all other parameters are fixed.
 
     Attributes:
         ep_set: traced 2EP2 and CEP2; None if the plane does not contain the EP set.
-        laws: label of an equation → (horizontal, vertical) values of its curve, nan where it does not exist.
-        marked: name → point in closed form.
+        laws: label of an equation → (horizontal, vertical) values of its curve; nan where the curve does not exist.
+        marked: name → point to mark, (horizontal, vertical).
     """
 
     chart: Chart
@@ -42,43 +42,43 @@ class Plane:
 
 
 def ep4() -> Table[float]:
-    """Parameters of the EP4 of Table 1, by the closed-form laws."""
+    """Parameters of the EP4 of Table 1, from the closed-form laws."""
     return table_1()[0].parameters
 
 
 def tilt_plane(chi_B_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:
-    """(Fr, λ_s) at a distance in χ_B from the law `chib1`; on the law with the EP set, unless without boundaries."""
-    at, tilt = ep4(), np.linspace(*TILT, 1200)
-    chi_B, on_law = at["chi_B"] + chi_B_offset, not chi_B_offset
+    """The plane (Fr, λ_s) at a distance in χ_B from the law `chib1`; at distance 0 with boundaries, with the EP set."""
+    ep4_parameters, tilt = ep4(), np.linspace(*TILT, 1200)
+    chi_B, on_law = ep4_parameters["chi_B"] + chi_B_offset, not chi_B_offset
     curves, marked = {"Frc1": (np.sqrt(laws.Frc1(chi_B, ZETA_B, ZETA_H, tilt)), tilt)}, {}
     if on_law:
         curves["epset"] = (np.asarray(laws.epset(ZETA_B, ZETA_H, tilt)), tilt)
-        curves["tls"] = (np.array(FR), np.full(2, at["lambda_s"]))
-        marked = {"EP4": (at["Fr"], at["lambda_s"])}
+        curves["tls"] = (np.array(FR), np.full(2, ep4_parameters["lambda_s"]))
+        marked = {"EP4": (ep4_parameters["Fr"], ep4_parameters["lambda_s"])}
     plane = chart(bicycle({"chi_B": chi_B}, {"Fr": FR, "lambda_s": TILT}), points=points, boundaries=boundaries)
     return Plane(plane, ep_set() if on_law and boundaries else None, curves, marked)
 
 
 def chi_B_plane(tilt_offset: float = 0.0, points: tuple[int, int] = (320, 240), boundaries: bool = True) -> Plane:
-    """(Fr, χ_B) at a distance in rad from the tilt `tls`."""
-    at, chi_B = ep4(), np.linspace(*CHI_B, 1200)
-    tilt = at["lambda_s"] + tilt_offset
+    """The plane (Fr, χ_B) at a distance in rad from the tilt of the law `tls`."""
+    ep4_parameters, chi_B = ep4(), np.linspace(*CHI_B, 1200)
+    tilt = ep4_parameters["lambda_s"] + tilt_offset
     curves = {
         "Frc1": (np.sqrt(laws.Frc1(chi_B, ZETA_B, ZETA_H, tilt)), chi_B),
-        "chib1": (np.array(FR), np.full(2, at["chi_B"])),
+        "chib1": (np.array(FR), np.full(2, ep4_parameters["chi_B"])),
     }
-    marked = {"least Fr_c": (float(laws.frm(ZETA_B, ZETA_H, tilt)), at["chi_B"])}
+    marked = {"least Fr_c": (float(laws.frm(ZETA_B, ZETA_H, tilt)), ep4_parameters["chi_B"])}
     if not tilt_offset:
-        marked["EP4"] = (at["Fr"], at["chi_B"])
+        marked["EP4"] = (ep4_parameters["Fr"], ep4_parameters["chi_B"])
     problem = bicycle({"lambda_s": tilt}, {"Fr": FR, "chi_B": CHI_B})
     return Plane(chart(problem, points=points, boundaries=boundaries), None, curves, marked)
 
 
 def section(Fr_offset: float, points: tuple[int, int] = (240, 200)) -> Plane:
-    """(χ_B, λ_s) at a distance from the Froude number of EP4."""
-    at = ep4()
-    problem = bicycle({"Fr": at["Fr"] + Fr_offset}, {"chi_B": CHI_B, "lambda_s": (0.01, 1.2)})
-    marked = {} if Fr_offset else {"EP4": (at["chi_B"], at["lambda_s"])}
+    """The plane (χ_B, λ_s) at a distance from the Froude number of EP4."""
+    ep4_parameters = ep4()
+    problem = bicycle({"Fr": ep4_parameters["Fr"] + Fr_offset}, {"chi_B": CHI_B, "lambda_s": (0.01, 1.2)})
+    marked = {} if Fr_offset else {"EP4": (ep4_parameters["chi_B"], ep4_parameters["lambda_s"])}
     return Plane(chart(problem, points=points), None, {}, marked)
 
 
@@ -89,12 +89,12 @@ def surface() -> Swallowtail:
 
 
 def ep_set() -> Trace:
-    """The EP set of the paper, traced from the pattern alone."""
+    """The EP set of the paper, traced by the pattern without the laws."""
     free = {"Fr": FR, "chi_B": (1.01, 3.0), "lambda_s": TILT}
     return trace(bicycle({}, free), "2EP2", step=0.004)
 
 
 def bicycle(fixed: Mapping[str, float], free: Mapping[str, tuple[float, float]]) -> Problem:
     """The χ_H = 1 bicycle with the heights of the benchmark."""
-    always = {"chi_H": 1.0, "zeta_B": ZETA_B, "zeta_H": ZETA_H, "mu": MU}
-    return Problem(tms, fixed={**always, **fixed}, free=dict(free))
+    shared = {"chi_H": 1.0, "zeta_B": ZETA_B, "zeta_H": ZETA_H, "mu": MU}
+    return Problem(tms, fixed={**shared, **fixed}, free=dict(free))

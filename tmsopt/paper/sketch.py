@@ -10,15 +10,15 @@ from tmsopt.records import Array, Table
 
 @dataclass(frozen=True)
 class Sketch:
-    """Points (x, z) of the side view, in wheelbases: x forward, z down, the rear contact at the origin.
+    """Points (x, z) of the side view, in wheelbases; x is forward, z is down, the origin is the rear contact.
 
     Attributes:
         parameters: the native parameters.
-        rear, front: contacts of the skates, shape (2,).
+        rear, front: contact points of the skates, shape (2,).
         B, H: the two masses.
-        axis: unit vector up along the steer axis, which passes through the front contact (zero trail).
+        axis: unit vector along the steer axis, upward; the axis passes through the front contact (zero trail).
         foot: foot of the perpendicular from H on the steer axis.
-        nu_H: signed distance of H from the axis, positive in front of it (below equation matrices).
+        nu_H: signed distance of H from the axis, positive in front of it (text below equation matrices).
     """
 
     parameters: Table[float]
@@ -38,11 +38,11 @@ class Sketch:
 def sketch(parameters: Mapping[str, float]) -> Sketch:
     """Geometry of the design with these native parameters.
 
-    H is projected on the axis as a vector, so that ν_H here does not repeat the formula that the model uses.
+    H is projected on the axis as a vector, so that ν_H is computed without the formula of the model.
     """
     p = Table(parameters)
     front, H = np.array([1.0, 0.0]), np.array([p["chi_H"], p["zeta_H"]])
-    axis = -np.array([np.sin(p["lambda_s"]), np.cos(p["lambda_s"])])  # a positive tilt leans its top back
+    axis = -np.array([np.sin(p["lambda_s"]), np.cos(p["lambda_s"])])  # with a positive tilt, its top leans back
     forward = np.array([-axis[1], axis[0]])
     foot = front + np.dot(H - front, axis) * axis
     return Sketch(

@@ -1,7 +1,7 @@
-"""The universal chart of quartics: every polynomial of degree 4 with a4/a0 > 0, scaled to three numbers.
+"""The universal chart of quartics: scaling reduces every polynomial of degree 4 with a4/a0 > 0 to three numbers.
 
-With s = |ω0| σ and ω0⁴ = a4/a0 it is σ⁴ + A1 σ³ + A2 σ² + A3 σ + 1. Stability, heavy damping and exceptional points are
-fixed sets of (A1, A2, A3), the same for every model.
+With s = |ω0| σ and ω0⁴ = a4/a0, the polynomial is σ⁴ + A1 σ³ + A2 σ² + A3 σ + 1. Stability, heavy damping and
+exceptional points are sets of (A1, A2, A3) that are the same for every model.
 """
 
 from dataclasses import dataclass
@@ -23,8 +23,8 @@ class UniversalPath:
     Attributes:
         name: name of its exceptional point.
         tilt: λ_s in rad.
-        A: A1, A2, A3 in the columns, shape (n, 3); A1 = A3, because χ_B obeys the law.
-        stable: the point where stability begins, shape (3,).
+        A: columns A1, A2, A3, shape (n, 3); A1 = A3, because χ_B obeys the law.
+        stable: the point at which the design becomes stable, shape (3,).
         exceptional: the exceptional point, shape (3,).
     """
 
@@ -54,13 +54,13 @@ def normalise_quartics(coefficients: Array) -> Array:
 
 
 def ep_set(A1: ArrayLike) -> Array:
-    """Points (A1, A2, A3) of the EP set: (σ² + (A1/2) σ + 1)², CEP2 for |A1| < 4, EP4 at 4, 2EP2 beyond."""
+    """Points (A1, A2, A3) of the EP set, (σ² + (A1/2) σ + 1)²: CEP2 for |A1| < 4, EP4 for 4, 2EP2 for larger |A1|."""
     a = np.asarray(A1, dtype=float)
     return np.stack([a, 2 + a * a / 4, a], axis=-1)
 
 
 def heavy_section(A1: ArrayLike) -> tuple[Array, Array]:
-    """Least and largest A2 of heavy damping in the plane A3 = A1; nan for A1 < 4, where there is none.
+    """Smallest and largest A2 of heavy damping in the plane A3 = A1; nan for A1 < 4, where no A2 gives it.
 
     In this plane the polynomial is σ² (y² + A1 y + A2 − 2), y = σ + 1/σ. All σ are real and negative exactly if both y
     are real and at most −2: A2 ≤ 2 + A1²/4 and, as −A1/2 ≤ −2, A2 ≥ 2 A1 − 2.
@@ -70,10 +70,10 @@ def heavy_section(A1: ArrayLike) -> tuple[Array, Array]:
 
 
 def spire(m: ArrayLike, t: ArrayLike) -> Array:
-    """Quartics with the roots −eᵐ twice, −e^(t−m) and −e^(−t−m), as points (A1, A2, A3).
+    """Quartics with the double root −eᵐ and the roots −e^(t−m) and −e^(−t−m), as points (A1, A2, A3).
 
-    Over all m and t ≥ 0 this is the whole boundary of heavy damping: (σ + x)² (σ² + b σ + 1/x²), x = eᵐ,
-    b = 2 cosh t / x. The 2EP2 line is t = 0, the cuspidal edges EP3 are t = ±2m, and EP4 is their meeting.
+    All m and t ≥ 0 give the whole boundary of heavy damping: (σ + x)² (σ² + b σ + 1/x²), x = eᵐ, b = 2 cosh t / x. The
+    2EP2 line has t = 0, the cuspidal edges EP3 have t = ±2m, and these curves meet at EP4.
     """
     x, c = np.exp(np.asarray(m, dtype=float)), np.cosh(np.asarray(t, dtype=float))
     b = 2 * c / x
@@ -81,15 +81,16 @@ def spire(m: ArrayLike, t: ArrayLike) -> Array:
 
 
 def spire_faces(limit: float, points: int = 41) -> tuple[Array, Array, Array]:
-    """The three faces of the boundary of heavy damping up to max(A1, A3) = limit > 4, shape (points, points, 3).
+    """The three faces of the boundary of heavy damping up to max(A1, A3) = limit > 4, shape (points, points, 3) each.
 
-    The double root is the largest, the smallest, or between the two others. Along the first axis a face goes from
-    EP4 to the limit; along the second from one edge to the next: 2EP2 to EP3, 2EP2 to EP3, EP3 to EP3.
+    On the faces, the double root has the largest modulus, the smallest, or one between those of the other roots. The
+    first axis of a face runs from EP4 to the limit, the second from one edge to the next: 2EP2 to EP3, 2EP2 to EP3, EP3
+    to EP3.
     """
     u = np.linspace(0, 1, points)
 
     def face(m: Array, t: Array) -> Array:
-        """Points (v m, v t): a ray per column, along which A1 and A3 grow from 4, cut at the limit."""
+        """Points (v m, v t): each column is a ray along which A1 and A3 grow from 4 to the limit."""
 
         def excess(v: float, m: float, t: float) -> float:
             return float(spire(v * m, v * t)[[0, 2]].max()) - limit
@@ -98,5 +99,5 @@ def spire_faces(limit: float, points: int = 41) -> tuple[Array, Array, Array]:
         v = np.outer(u, ends)
         return spire(v * m, v * t)
 
-    one = np.ones(points)
-    return face(one, 2 * u), face(-one, 2 * u), face(2 * u - 1, 2 * one)
+    ones = np.ones(points)
+    return face(ones, 2 * u), face(-ones, 2 * u), face(2 * u - 1, 2 * ones)

@@ -1,7 +1,7 @@
 """Study: one problem solved for thousands of rows of varied values.
 
-In: a study file, or `Study`. Out: `Results`, with rows kept in a store that survives any kill. Open `study` first,
-then `run`; `store` keeps the rows.
+In: a study file, or a `Study`. Out: `Results`; the store of its rows survives a kill of the process. Read `study`
+first, then `run`; `store` saves the rows.
 """
 
 import lazy_loader

@@ -1,6 +1,6 @@
 from .export import FORMATS as FORMATS, check_export as check_export, export as export
 from .files import load_study as load_study, read_csv as read_csv
-from .monte_carlo import Sampling as Sampling, monte_carlo as monte_carlo, plan_study as plan_study
+from .monte_carlo import Sampling as Sampling, monte_carlo as monte_carlo, prepare_study as prepare_study
 from .rows import Row as Row, RowTable as RowTable, header as header, batch_rows as batch_rows
 from .run import Results as Results, run_study as run_study, read_results as read_results
 from .sampling import (

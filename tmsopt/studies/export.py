@@ -1,4 +1,4 @@
-"""Rows of a study as a table in a file: CSV, Parquet or netCDF."""
+"""Export of the rows of a study to a table in a file: CSV, Parquet or netCDF."""
 
 import csv
 import json
@@ -21,18 +21,18 @@ def export(
     metadata: Mapping[str, Any] | None = None,
     progress: Listener | None = None,
 ) -> None:
-    """Write rows to a file in the format of its ending, one of `FORMATS`; doubles are exact.
+    """Write rows to a file; its ending, one of `FORMATS`, determines the format. Doubles are exact.
 
-    Absent values are blank in CSV (as is nan), null in Parquet and nan in netCDF. netCDF has the dimension ``row``, and
-    for rows that fill a grid also the group ``grid`` over the varied values.
+    A missing value is an empty cell in CSV (as is nan), null in Parquet and nan in netCDF. A netCDF file has the
+    dimension ``row``. If the rows fill a grid, it also has the group ``grid``, whose dimensions are the varied values.
 
     Args:
         metadata: plain data such as `Store.about`, written as JSON to Parquet (schema metadata, key ``tmsopt``) and
             netCDF (attribute ``tmsopt``).
-        progress: called with a `tmsopt.Progress` now and then.
+        progress: called from time to time with a `tmsopt.Progress`.
 
     Raises:
-        InputError: for another ending, a missing package, or a file that cannot be written.
+        InputError: for an unknown ending, a missing package, or a file that cannot be written.
     """
     path = Path(path)
     write = check_export(path)
@@ -44,10 +44,10 @@ def export(
 
 
 def check_export(path: Path) -> "Writer":
-    """The function that exports rows to a file, before any work is done; imports the packages for it.
+    """Check an export before any work is done, import its packages, and return the function that writes it.
 
     Raises:
-        InputError: for another ending, a missing package or folder, or a path that is not a regular file.
+        InputError: for an unknown ending, a missing package or folder, or a path that is not a regular file.
     """
     write, modules = FORMATS.get(path.suffix.lstrip(".").lower(), (None, ()))
     if write is None:
@@ -61,85 +61,85 @@ def check_export(path: Path) -> "Writer":
     return write
 
 
-def _batches(rows: RowTable, steps: Steps | None) -> Iterator[dict[str, Any]]:
-    """Columns of successive rows, at least one batch even without rows; reports progress."""
+def _split_columns(rows: RowTable, steps: Steps | None) -> Iterator[dict[str, Any]]:
+    """Columns of successive blocks of rows, one empty block if there are no rows; reports progress."""
     for first in range(0, max(len(rows), 1), BLOCK):
         yield {head: rows.column(head, slice(first, first + BLOCK)) for head in rows.headers}
         if steps:
             steps(min(first + BLOCK, len(rows)), len(rows))
 
 
-def _csv(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps | None) -> None:
+def _write_csv(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps | None) -> None:
     units = metadata.get("units", {})
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(format_cell(format_header(head, units.get(_bare(head), ""))) for head in rows.headers)
-        for columns in _batches(rows, steps):
-            writer.writerows(map(_cell, line) for line in zip(*(c.tolist() for c in columns.values()), strict=True))
+        writer.writerow(format_cell(format_header(head, units.get(_strip_header(head), ""))) for head in rows.headers)
+        for columns in _split_columns(rows, steps):
+            writer.writerows(map(_to_cell, line) for line in zip(*(c.tolist() for c in columns.values()), strict=True))
 
 
-def _bare(header: str) -> str:
-    """The name whose unit a column has: a header without prefix and end."""
+def _strip_header(header: str) -> str:
+    """A header without its prefix and its end: the name whose unit the column has."""
     for table in ("varied", "reports", "violations"):
         header = header.removeprefix(PREFIXES[table])
     return re.sub(r"\.(min|max|limit)$", "", header)
 
 
-def _cell(value: Any) -> Any:
-    """A blank for nan."""
+def _to_cell(value: Any) -> Any:
+    """A value as text of a cell; None, which is an empty cell, for nan."""
     if isinstance(value, bool):
         return str(value).lower()
     return None if value != value else format_cell(value)  # noqa: PLR0124
 
 
-def _parquet(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps | None) -> None:
+def _write_parquet(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps | None) -> None:
     pa, parquet = import_optional("pyarrow"), import_optional("pyarrow.parquet")
     kinds = {head: rows.column(head, slice(0)).dtype for head in rows.headers}
     types = {head: pa.string() if kind.hasobject else pa.from_numpy_dtype(kind) for head, kind in kinds.items()}
     schema = pa.schema(types, {"tmsopt": json.dumps(metadata)})
     with parquet.ParquetWriter(path, schema) as writer:
-        for columns in _batches(rows, steps):
+        for columns in _split_columns(rows, steps):
             arrays = [pa.array(c.data, types[head], mask=c.mask, from_pandas=False) for head, c in columns.items()]
             writer.write_table(pa.table(arrays, schema=schema))
 
 
-def _netcdf(rows: RowTable, path: Path, metadata: Mapping[str, Any], _: Steps | None) -> None:
-    over_rows = _dataset(rows, _table(rows).set_index(rows.numbers).rename_axis("row"))
+def _write_netcdf(rows: RowTable, path: Path, metadata: Mapping[str, Any], _: Steps | None) -> None:
+    row_dataset = _build_dataset(rows, _build_table(rows).set_index(rows.numbers).rename_axis("row"))
     with netcdf_errors():
-        over_rows.assign_attrs(tmsopt=json.dumps(metadata)).to_netcdf(path, engine="netcdf4")
-        if (over_grid := build_grid_dataset(rows)) is not None:
-            over_grid.to_netcdf(path, mode="a", group="grid", engine="netcdf4")
+        row_dataset.assign_attrs(tmsopt=json.dumps(metadata)).to_netcdf(path, engine="netcdf4")
+        if (grid_dataset := build_grid_dataset(rows)) is not None:
+            grid_dataset.to_netcdf(path, mode="a", group="grid", engine="netcdf4")
 
 
 def build_grid_dataset(rows: RowTable) -> Any:
-    """Rows that fill a grid as a dataset over the varied values; None for others.
+    """The rows as a dataset over the varied values; None if they do not fill a grid.
 
-    A name with one value in all rows is not an axis.
+    A name that has the same value in all rows is not an axis.
 
     Raises:
         InputError: if xarray is not installed.
     """
     import_optional("xarray")
-    table = _table(rows)
+    table = _build_table(rows)
     sizes = {name: table[name].nunique() for name in table if name.startswith(PREFIXES["varied"])}
     axes = [name for name, size in sizes.items() if size > 1]
     if not axes or math.prod(sizes.values()) != len(table) or table.duplicated(axes).any():
         return None
-    return _dataset(rows, table.set_index(axes))
+    return _build_dataset(rows, table.set_index(axes))
 
 
-def _names(rows: RowTable) -> dict[str, str]:
-    """Name of a variable → header; netCDF allows no slash, and ``row`` is the dimension."""
+def _variable_names(rows: RowTable) -> dict[str, str]:
+    """Name of a variable in netCDF, which has no slash and is not ``row``, the dimension → header."""
     return {head.replace("/", " over ").strip() + "_" * (head == "row"): head for head in rows.headers}
 
 
-def _table(rows: RowTable) -> Any:
-    return frame({name: rows.values(head) for name, head in _names(rows).items()})
+def _build_table(rows: RowTable) -> Any:
+    return frame({name: rows.values(head) for name, head in _variable_names(rows).items()})
 
 
-def _dataset(rows: RowTable, table: Any) -> Any:
+def _build_dataset(rows: RowTable, table: Any) -> Any:
     dataset = table.to_xarray()
-    for name, head in _names(rows).items():
+    for name, head in _variable_names(rows).items():
         dataset[name].attrs["long_name"] = head
     return dataset
 
@@ -147,8 +147,8 @@ def _dataset(rows: RowTable, table: Any) -> Any:
 Writer = Callable[[RowTable, Path, Mapping[str, Any], Steps | None], None]
 
 FORMATS: Mapping[str, tuple[Writer, tuple[str, ...]]] = {
-    "csv": (_csv, ()),
-    "parquet": (_parquet, ("pyarrow", "pyarrow.parquet")),
-    "nc": (_netcdf, ("xarray", "netCDF4")),
+    "csv": (_write_csv, ()),
+    "parquet": (_write_parquet, ("pyarrow", "pyarrow.parquet")),
+    "nc": (_write_netcdf, ("xarray", "netCDF4")),
 }
-"""Ending → function that writes rows, and its modules from the extra ``data``."""
+"""Ending of a file → function that writes rows, and the modules it needs from the extra ``data``."""

@@ -1,4 +1,4 @@
-"""Study files: TOML to a Study or a Monte Carlo `Sampling`, with every fault at its line."""
+"""Reads study files: TOML becomes a Study or a Monte Carlo `Sampling`; every fault is reported with its line."""
 
 import csv
 import math
@@ -38,12 +38,12 @@ from tmsopt.studies.sampling import (
 from tmsopt.studies.study import METHODS, Study, common_faults, name_faults
 
 LARGEST = 1_000_000_000
-"""Most bytes of a CSV file."""
+"""Largest number of bytes of a CSV file."""
 
 MOST_COLUMNS, LONGEST_LINE = 1000, 1_000_000
-"""Most columns of a CSV file, and most characters of a line."""
+"""Largest number of columns of a CSV file, and of characters in a line."""
 
-_SHOWN = 20  # faults of cells that are listed; a file in another format has one in each cell
+_MAX_CELL_FAULTS = 20  # largest number of faults listed; a file in another format has a fault in each cell
 _NO_POINTS = "; a sample has rows, under [study]"
 _RANGE = "{ min = 0.1, max = 1 }, with log = true for equal factors"
 _VARIED = {
@@ -56,18 +56,18 @@ _VARIED = {
 
 
 def unit_of(problem: Posed, name: str) -> str:
-    """The unit of a varied name, 1 for a dimensionless one."""
+    """The unit of a varied name; 1 if it is dimensionless."""
     stem, _, end = name.rpartition(".")
     return dimension_of(problem, stem).unit if end == "limit" else si_units(problem).get(stem or name, "1")
 
 
-def _place(faults: Iterable[Fault], *section: str) -> list[Fault]:
-    """Faults of a table inside a section, with the section in their keys."""
+def _prefix_keys(faults: Iterable[Fault], *section: str) -> list[Fault]:
+    """The faults of a table inside a section; the section is added to their keys."""
     return [replace(f, key=(*section, *f.key)) for f in faults]
 
 
-def _entries(table: Mapping[str, Any]) -> Iterator[tuple[str, Key, Any]]:
-    """Each name, its place and its value; ``trail.limit = …`` without quotes is a table in TOML."""
+def _list_entries(table: Mapping[str, Any]) -> Iterator[tuple[str, Key, Any]]:
+    """Each varied name, its key in the file, and its value. In TOML, ``trail.limit = …`` without quotes is a table."""
     for name, spec in table.items():
         if isinstance(spec, Mapping) and any(isinstance(inner, list | Mapping) for inner in spec.values()):
             yield from ((f"{name}.{end}", ("vary", name, end), inner) for end, inner in spec.items())
@@ -75,43 +75,45 @@ def _entries(table: Mapping[str, Any]) -> Iterator[tuple[str, Key, Any]]:
             yield name, ("vary", name), spec
 
 
-def _read_vary(problem: Posed, written: "_StudyFile", faults: list[Fault]) -> dict[str, Any]:
-    """Name → list of numbers, or `Span`; adds to `faults`."""
-    method, read, wrong_with = written.study.method, {}, name_faults(problem)
-    if not written.vary:
+def _read_vary(problem: Posed, content: "_StudyFile", faults: list[Fault]) -> dict[str, Any]:
+    """Read the varied values: name → list of numbers, or `Span`; adds to `faults`."""
+    method, values, find_fault = content.study.method, {}, name_faults(problem)
+    if not content.vary:
         faults.append(Fault(f"nothing varies; add a name under [vary], such as mu = {_VARIED[method]}", ("vary",)))
-    for name, key, spec in _entries(written.vary):
-        if wrong := wrong_with(name):
-            faults.append(Fault(wrong, key))
+    for name, key, spec in _list_entries(content.vary):
+        if message := find_fault(name):
+            faults.append(Fault(message, key))
         elif isinstance(spec, list) and spec and method in ("grid", "list"):
             unit = unit_of(problem, name)
-            read[name] = [_number(value, unit, key, faults) for value in spec]
+            values[name] = [_read_number(value, unit, key, faults) for value in spec]
         elif isinstance(spec, Mapping) and method != "list":
-            read[name] = _range(name, unit_of(problem, name), key, spec, method, faults)
+            values[name] = _read_range(name, unit_of(problem, name), key, spec, method, faults)
         else:
             faults.append(Fault(f"found {short(spec)}; accepted: {_VARIED[method]}", key))
-    return read
+    return values
 
 
-def _range(name: str, unit: str, key: Key, spec: Mapping[str, Any], method: str, faults: list[Fault]) -> Any:
-    """The span of a range, whose `points` are checked too; adds to `faults`."""
-    needed, hint = (("min", "max", "points"), "") if method == "grid" else (("min", "max"), _NO_POINTS)
-    found = [Fault(f"missing {end} of {name}; accepted: {_VARIED[method]}", key) for end in needed if end not in spec]
-    accepted = (*needed, "log")
+def _read_range(name: str, unit: str, key: Key, spec: Mapping[str, Any], method: str, faults: list[Fault]) -> Any:
+    """Read the span of a range, and check its `points`; adds to `faults`."""
+    required, hint = (("min", "max", "points"), "") if method == "grid" else (("min", "max"), _NO_POINTS)
+    range_faults = [
+        Fault(f"missing {end} of {name}; accepted: {_VARIED[method]}", key) for end in required if end not in spec
+    ]
+    accepted = (*required, "log")
     for end in (end for end in spec if end not in accepted):
-        found.append(Fault(f"unknown key {short(end)} of {name}; {suggest(end, accepted)}{hint}", (*key, end)))
-    low, high = (_number(spec.get(end, 0.0), unit, (*key, end), found) for end in ("min", "max"))
+        range_faults.append(Fault(f"unknown key {short(end)} of {name}; {suggest(end, accepted)}{hint}", (*key, end)))
+    low, high = (_read_number(spec.get(end, 0.0), unit, (*key, end), range_faults) for end in ("min", "max"))
     log = spec.get("log", False)
     if not isinstance(log, bool):
-        found.append(Fault(f"found {short(log)}; accepted: true or false", (*key, "log")))
-    found += _place(count_faults("points", spec.get("points", 2), 2, MOST_ROWS), *key)
+        range_faults.append(Fault(f"found {short(log)}; accepted: true or false", (*key, "log")))
+    range_faults += _prefix_keys(count_faults("points", spec.get("points", 2), 2, MOST_ROWS), *key)
     span = Span(low, high, log)
-    faults += found or [replace(f, key=key) for f in span_faults(name, span)]
+    faults += range_faults or [replace(f, key=key) for f in span_faults(name, span)]
     return span
 
 
-def _number(value: Any, unit: str, key: Key, faults: list[Fault]) -> float:
-    """A number, or a text with a unit; 0 and a fault for anything else."""
+def _read_number(value: Any, unit: str, key: Key, faults: list[Fault]) -> float:
+    """Read a number, or a text with a unit; anything else gives 0 and adds to `faults`."""
     if is_number(value):
         return float(value)
     message = f"found {short(value)}; accepted: a finite number"
@@ -124,31 +126,31 @@ def _number(value: Any, unit: str, key: Key, faults: list[Fault]) -> float:
     return 0.0
 
 
-def _rows(read: Mapping[str, Any], written: "_StudyFile") -> dict[str, Any]:
-    """Arguments of the Study for the values of its file: columns, notes and the shape of a grid."""
-    options, rows = written.study, written.study.rows or 0
+def _make_columns(values: Mapping[str, Any], content: "_StudyFile") -> dict[str, Any]:
+    """Make the arguments of a Study from the values of its file: columns, notes and the shape of a grid."""
+    options, rows = content.study, content.study.rows or 0
     match options.method:
         case "latin_hypercube":
-            return {"columns": latin_hypercube(read, rows, options.seed)}
+            return {"columns": latin_hypercube(values, rows, options.seed)}
         case "sobol":
-            return {"columns": sobol(read, rows, options.seed), "notes": [*filter(None, [sobol_note(rows)])]}
+            return {"columns": sobol(values, rows, options.seed), "notes": [*filter(None, [sobol_note(rows)])]}
         case "grid":
-            entries = _entries(written.vary)
+            entries = _list_entries(content.vary)
             sizes = {name: spec["points"] if isinstance(spec, Mapping) else len(spec) for name, _, spec in entries}
             check_size(list(sizes.values()))
-            axes = {name: axis.points(sizes[name]) if isinstance(axis, Span) else axis for name, axis in read.items()}
+            axes = {name: axis.points(sizes[name]) if isinstance(axis, Span) else axis for name, axis in values.items()}
             return {"columns": grid(axes), "grid_shape": sizes}
-    return {"columns": read}
+    return {"columns": values}
 
 
 def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] = lambda name: "") -> dict[str, Column]:
-    """The columns of a CSV file whose first line has their names.
+    """Read the columns of a CSV file; its first line has their names.
 
-    Cells are numbers in rad and SI units, separated by commas, or texts such as ``20 deg`` where units are known. A
-    byte order mark and empty lines are ignored.
+    Cells are separated by commas. A cell is a number in rad and SI units, or a text such as ``20 deg`` if the unit of
+    its column is known. A byte order mark and empty lines are ignored.
 
     Args:
-        unit_of: name of a column → unit of its numbers, empty for an unknown one.
+        unit_of: name of a column → unit of its numbers; empty if unknown.
 
     Raises:
         InputError: listing every fault with file, line and column.
@@ -162,23 +164,23 @@ def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] = lambda n
 
         try:
             names = [name.strip() for name in next(reader, [])]
-            if wrong := [fault(message) for message in _header_faults(names)]:
-                raise InputError(wrong)
+            if first_faults := [fault(message) for message in _header_faults(names)]:
+                raise InputError(first_faults)
             columns, units = [array("d") for _ in names], [unit_of(name) for name in names]
-            most = most_rows(len(names))
+            max_rows = most_rows(len(names))
             for cells in filter(None, reader):
                 if len(cells) != len(names):
                     faults.append(fault(f"found {len(cells)} cells; accepted: {len(names)}, with decimal points"))
                     continue
                 for column, name, unit, cell in zip(columns, names, units, cells, strict=True):
                     try:
-                        column.append(_cell(cell, unit))
+                        column.append(_parse_cell(cell, unit))
                     except ValueError as error:
                         faults.append(fault(str(error), name))
-                if len(columns[0]) > most:
-                    raise InputError([fault(f"more than {most} rows; accepted: up to {most}")])
-                if len(faults) > _SHOWN:
-                    raise InputError([*faults[:_SHOWN], fault("and more after these")])
+                if len(columns[0]) > max_rows:
+                    raise InputError([fault(f"more than {max_rows} rows; accepted: up to {max_rows}")])
+                if len(faults) > _MAX_CELL_FAULTS:
+                    raise InputError([*faults[:_MAX_CELL_FAULTS], fault("and more after these")])
         except csv.Error as error:
             raise InputError([fault(f"not CSV: {error}")]) from None
     if not (faults or columns[0]):
@@ -204,25 +206,25 @@ def _header_faults(names: list[str]) -> Iterator[str]:
                 yield f"column {number} has no name; {example}"
             elif name in names[: number - 1]:
                 yield f"{short(name)} names two columns; leave one out"
-            elif math.isfinite(_float(name)):
+            elif math.isfinite(_parse_float(name)):
                 yield f"found the number {name[:60]} for the name of column {number}; {example}"
 
 
-def _float(cell: str) -> float:
-    """A number as in TOML (Python also accepts underscores); nan for another text."""
+def _parse_float(cell: str) -> float:
+    """A number as in TOML, without the underscores that Python accepts; nan for another text."""
     try:
         return math.nan if "_" in cell else float(cell)
     except ValueError:
         return math.nan
 
 
-def _cell(cell: str, unit: str) -> float:
+def _parse_cell(cell: str, unit: str) -> float:
     """A number, or a text with a unit.
 
     Raises:
         ValueError: for another text.
     """
-    if math.isfinite(number := _float(cell)):
+    if math.isfinite(number := _parse_float(cell)):
         return number
     if not cell.strip():
         raise ValueError("an empty cell; accepted: a number in every cell")
@@ -231,14 +233,14 @@ def _cell(cell: str, unit: str) -> float:
     return parse_quantity(cell, unit)
 
 
-_GOES_WITH: Mapping[Key, tuple[tuple[str, ...], str]] = {
+_METHODS_OF_KEY: Mapping[Key, tuple[tuple[str, ...], str]] = {
     ("study", "rows"): (("latin_hypercube", "sobol", "monte_carlo"), "rows = 1024"),
     ("study", "csv"): (("csv",), 'csv = "rows.csv"'),
     ("study", "distribution"): (("monte_carlo",), ""),
     ("vary",): (tuple(_VARIED), ""),
     ("tolerances",): (("monte_carlo",), ""),
 }
-"""Key → methods that it goes with, and an example if they require it."""
+"""Key → methods that accept it, and an example if they require it."""
 
 _ACCEPTED = {
     "title": "a text in quotes",
@@ -271,7 +273,7 @@ class _Options(Section):
     seed: StrictInt = 0
     """Seed of the samples and of the starts."""
     starts: StrictInt = STARTS
-    """Most starts of a row."""
+    """Largest number of starts of a row."""
     warm: StrictBool = False
     """Whether each row starts at the optimum of its neighbour."""
     report: list[StrictStr] = Field(default_factory=list)
@@ -294,14 +296,14 @@ class _StudyFile(Section):
 
 
 SHAPE: type[Section] = _StudyFile
-"""The shape of a study file, for editors."""
+"""The model of a study file, for the JSON Schema that editors use."""
 
 
 def load_study(path: str | PathLike[str]) -> Study | Sampling:
     """Read a study file; a Monte Carlo study is a `Sampling`, which `run_study` turns into a Study.
 
-    The file names a problem file, or has its tables as [problem.parameters] and so on. Names of files are relative to
-    the study file. Units are written as in problem files::
+    The file names a problem file, or contains the tables of a problem: [problem.parameters] and so on. Names of files
+    are relative to the study file. Units are written as in problem files::
 
         problem = "realistic.toml"
         [study]
@@ -310,11 +312,11 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
         csv = "rows.csv"           # for csv
         distribution = "uniform"   # or normal, for monte_carlo
         seed = 0
-        starts = 64                # most starts of a row; for monte_carlo, of its nominal design
+        starts = 64                # largest number of starts of a row, or of the nominal design for monte_carlo
         warm = false               # whether each row starts at the optimum of its neighbour
         report = ["nu_H", "2*Fr_c"]
         [vary]
-        mu = { min = 0.05, max = 1, points = 20, log = true }   # for a grid; samples have no points, lists only values
+        mu = { min = 0.05, max = 1, points = 20, log = true }   # for a grid; without points for a sample
         zeta_H = [-0.2, -0.25]
         "lambda_s.max" = ["20 deg", "30 deg"]
         "offset.limit" = [0.02, 0.05]
@@ -338,108 +340,108 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
             f'or write a study file with problem = "{Path(page.file).name}" and the varied names under [vary]'
         )
         raise InputError([Fault(message, file=page.file)])
-    faults, written = validate_tables(page.data, _StudyFile, _shape_fault)
+    faults, content = validate_tables(page.data, _StudyFile, _shape_fault)
     title = escape_unprintable(Path(page.file).stem)
-    problem = _problem(page, title, faults)
-    if written is None or problem is None:
+    problem = _read_problem(page, title, faults)
+    if content is None or problem is None:
         raise page.error(faults)
-    options, posed = written.study, problem.posed
+    options, posed = content.study, problem.posed
     faults += [
-        *_method_faults(written, {f.key for f in faults}),
-        *_place(common_faults(posed, options.seed, options.starts, options.report), "study"),
+        *_method_faults(content, {f.key for f in faults}),
+        *_prefix_keys(common_faults(posed, options.seed, options.starts, options.report), "study"),
     ]
-    read: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     if options.method == "monte_carlo":
-        given = dict[str, Any].fromkeys(TABLES) | {"tolerances": written.tolerances}
-        tables, _, _, unreadable = read_numbers(given, posed.parameter_set)
-        read, faults = tables["tolerances"], faults + unreadable
+        numbers = dict[str, Any].fromkeys(TABLES) | {"tolerances": content.tolerances}
+        tables, _, _, number_faults = read_numbers(numbers, posed.parameter_set)
+        values, faults = tables["tolerances"], faults + number_faults
     elif options.method == "csv" and options.csv:
-        read = _read_rows(page, options.csv, posed, faults)
+        values = _read_rows(page, options.csv, posed, faults)
     elif options.method in _VARIED:
-        read = _read_vary(posed, written, faults)
+        values = _read_vary(posed, content, faults)
     if faults:
         raise page.error(faults)
     common: dict[str, Any] = options.model_dump(include={"seed", "starts", "report"})
-    common |= {"problem": problem, "title": written.title.strip() or title}
+    common |= {"problem": problem, "title": content.title.strip() or title}
     try:
         if options.method == "monte_carlo":
             distribution = options.distribution or DISTRIBUTIONS[0]
-            return Sampling(rows=options.rows or 0, distribution=distribution, tolerances=read, **common)
-        return Study(warm=options.warm, method=options.method, **_rows(read, written), **common)
+            return Sampling(rows=options.rows or 0, distribution=distribution, tolerances=values, **common)
+        return Study(warm=options.warm, method=options.method, **_make_columns(values, content), **common)
     except InputError as error:
-        placed = [replace(f, key=(*_PLACES.get(f.key[0], f.key[:1]), *f.key[1:])) for f in error.faults]
-        raise page.error(placed) from None
+        file_faults = [replace(f, key=(*_FILE_KEYS.get(f.key[0], f.key[:1]), *f.key[1:])) for f in error.faults]
+        raise page.error(file_faults) from None
 
 
-_PLACES: Mapping[str, Key] = {
+_FILE_KEYS: Mapping[str, Key] = {
     "columns": ("vary",),
     "ranges": ("vary",),
     "rows": ("study", "rows"),
     "distribution": ("study", "distribution"),
 }
-"""Arguments of a study or a sample → section or key of the file that states them."""
+"""Argument of a study or a sample → section or key of the file for it."""
 
 
-def _problem(page: Page, title: str, faults: list[Fault]) -> Problem | None:
-    """The problem of a study; adds to `faults`."""
-    stated = page.data.get("problem")
-    if isinstance(stated, dict):
-        found, problem = problem_from_tables(stated, str(page.data.get("title", "")).strip() or title)
-        faults += _place([*found, *(find_question_faults(problem.posed) if problem else ())], "problem")
+def _read_problem(page: Page, title: str, faults: list[Fault]) -> Problem | None:
+    """Read the problem of a study; adds to `faults`."""
+    source = page.data.get("problem")
+    if isinstance(source, dict):
+        problem_faults, problem = problem_from_tables(source, str(page.data.get("title", "")).strip() or title)
+        faults += _prefix_keys([*problem_faults, *(find_question_faults(problem.posed) if problem else ())], "problem")
         return problem
-    if isinstance(stated, str):  # anything else is reported as a fault of shape
+    if isinstance(source, str):  # anything else is reported as a fault of shape
         try:
-            return as_solvable(Path(page.file).parent / stated).problem
+            return as_solvable(Path(page.file).parent / source).problem
         except InputError as error:
-            faults += _faults_of_named_file(stated, error, ("problem",))
+            faults += _faults_of_named_file(source, error, ("problem",))
     return None
 
 
 def _faults_of_named_file(name: str, error: InputError, key: Key) -> list[Fault]:
-    """Faults of a file that a study names; a fault without a line is placed where the study names the file."""
-    more = "the name is relative to the study file"
-    return [f if f.line else Fault(f"'{name}' {f.message}; {more}", key) for f in error.faults]
+    """Faults of a file that a study names; a fault without a line gets the line in which the study names the file."""
+    hint = "the name is relative to the study file"
+    return [f if f.line else Fault(f"'{name}' {f.message}; {hint}", key) for f in error.faults]
 
 
 def _read_rows(page: Page, name: str, problem: Posed, faults: list[Fault]) -> dict[str, Column]:
-    """The columns of a CSV file that a study names; adds to `faults`."""
-    file, wrong_with = str(Path(page.file).parent / name), name_faults(problem)
+    """Read the columns of a CSV file that a study names; adds to `faults`."""
+    file, find_fault = str(Path(page.file).parent / name), name_faults(problem)
     try:
         columns = read_csv(file, partial(unit_of, problem))
     except InputError as error:
         faults += _faults_of_named_file(name, error, ("study", "csv"))
         return {}
-    faults += [Fault(wrong, (column,)).at(file, 1) for column in columns if (wrong := wrong_with(column))]
+    faults += [Fault(message, (column,)).at(file, 1) for column in columns if (message := find_fault(column))]
     return columns
 
 
-def _method_faults(written: _StudyFile, reported: Set[Key]) -> Iterator[Fault]:
+def _method_faults(content: _StudyFile, fault_keys: Set[Key]) -> Iterator[Fault]:
     """Faults of keys and sections that the method does not accept, or that it requires."""
-    method = written.study.method
+    method = content.study.method
     if method not in METHODS:
         yield Fault(f"unknown method {short(method)}; {suggest(method, METHODS)}", ("study", "method"))
         return
-    for key, (methods, example) in _GOES_WITH.items():
-        given = getattr(written.study if key[1:] else written, key[-1]) not in (None, {})
-        if given and method not in methods:
+    for key, (methods, example) in _METHODS_OF_KEY.items():
+        is_given = getattr(content.study if key[1:] else content, key[-1]) not in (None, {})
+        if is_given and method not in methods:
             name = key[-1] if key[1:] else f"[{key[0]}]"
             yield Fault(f'{name} does not go with method = "{method}"; accepted for {" ".join(methods)}', key)
-        elif example and method in methods and not given and key not in reported:
+        elif example and method in methods and not is_given and key not in fault_keys:
             message = f'missing {key[-1]}, which method = "{method}" needs; write e.g. {example}'
             yield Fault(message, ("study", "method"))
-    if method == "monte_carlo" and written.study.warm:
+    if method == "monte_carlo" and content.study.warm:
         yield Fault("a Monte Carlo study has no free parameters to start warm; remove this key", ("study", "warm"))
 
 
-def _shape_fault(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
-    """The fault for an error of pydantic, in terms of the study file."""
-    key = tuple(str(k) for k in where if k not in ("str", "dict[str,any]", "float", "int"))
-    last, inner = key[:2][-1], key[0] == "study" and len(key) > 1
+def _shape_fault(location: tuple[int | str, ...], kind: str, value: Any) -> Fault:
+    """The fault for an error of pydantic, in the words of the study file."""
+    key = tuple(str(k) for k in location if k not in ("str", "dict[str,any]", "float", "int"))
+    name, in_options = key[:2][-1], key[0] == "study" and len(key) > 1
     if kind == "extra_forbidden" and key[0] in ("parameters", "objective", "constraints"):
-        return Fault(f"belongs to the problem; write [problem.{last}], or name a problem file", key)
+        return Fault(f"belongs to the problem; write [problem.{name}], or name a problem file", key)
     if kind == "extra_forbidden":
-        accepted = (_Options if inner else _StudyFile).model_fields
-        return Fault(f"unknown key {short(last)}; {suggest(last, accepted)}", key)
+        accepted = (_Options if in_options else _StudyFile).model_fields
+        return Fault(f"unknown key {short(name)}; {suggest(name, accepted)}", key)
     if kind == "missing":
         return Fault('missing problem; write e.g. problem = "least_speed.toml", or a table [problem]', key)
-    return Fault(f"found {short(found)}; accepted: {_ACCEPTED[last if inner else key[0]]}", key[:2])
+    return Fault(f"found {short(value)}; accepted: {_ACCEPTED[name if in_options else key[0]]}", key[:2])

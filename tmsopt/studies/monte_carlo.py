@@ -1,4 +1,4 @@
-"""Monte Carlo over tolerances: designs drawn around a nominal one."""
+"""Monte Carlo studies: random designs within the tolerances of a nominal design."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,10 +23,10 @@ from tmsopt.studies.store import check_same, view_store
 from tmsopt.studies.study import Study, common_faults
 
 DISTRIBUTIONS = ("uniform", "normal")
-"""Distributions of an error: uniform within ± tolerance, or normal with a standard deviation of a third of the
-tolerance, truncated at ± tolerance (0.27 % would lie beyond)."""
+"""Distributions of an error: uniform within ± tolerance, or normal with a third of the tolerance as standard deviation.
+The normal one is truncated at ± tolerance; 0.27 % of the errors would exceed it."""
 
-_DEVIATIONS = 3  # standard deviations in a tolerance
+_DEVIATIONS_PER_TOLERANCE = 3  # a tolerance is this many standard deviations of the normal distribution
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,17 @@ class Sampling:
     """A Monte Carlo study whose nominal design is not solved yet; `run_study` solves it first.
 
     Attributes:
-        problem: the problem whose optimum is the nominal design, with its tolerances unless `tolerances` are given.
+        problem: its optimum is the nominal design, and its tolerances are used if `tolerances` is empty.
         rows: number of designs to draw.
         seed: seed of the draws; the nominal design is solved with seed 0.
         distribution: ``uniform``, or ``normal`` with a third of the tolerance as standard deviation, truncated.
-        starts: most starts of the nominal design.
+        tolerances: parameter → largest error in either direction.
+        title: one line for reports.
+        starts: largest number of starts in the search for the nominal design.
+        report: expressions recorded for every row.
 
     Raises:
-        InputError: listing all faults that are known before the design is solved.
+        InputError: listing all faults that can be found before the nominal design is solved.
 
     Example:
         >>> sampling = tmsopt.load_study("problems/study_built.toml")
@@ -61,35 +64,35 @@ class Sampling:
     report: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        problem = pose(self.problem)
-        tolerances = self.tolerances or problem.tolerances
-        found = [*find_question_faults(problem), *_tolerance_faults(problem, tolerances)]
-        found += [*common_faults(problem, self.seed, self.starts, self.report), *text_faults(self.title, "title")]
-        found += count_faults("rows", self.rows, 1, MOST_ROWS)
+        posed = pose(self.problem)
+        tolerances = self.tolerances or posed.tolerances
+        faults = [*find_question_faults(posed), *_tolerance_faults(posed, tolerances)]
+        faults += [*common_faults(posed, self.seed, self.starts, self.report), *text_faults(self.title, "title")]
+        faults += count_faults("rows", self.rows, 1, MOST_ROWS)
         if self.distribution not in DISTRIBUTIONS:
             message = f"found {short(self.distribution)}; {suggest(self.distribution, DISTRIBUTIONS)}"
-            found.append(Fault(message, ("distribution",)))
-        if found:
-            raise InputError(found)
-        vars(self).update(problem=problem.problem, tolerances=Table({n: float(t) for n, t in tolerances.items()}))
+            faults.append(Fault(message, ("distribution",)))
+        if faults:
+            raise InputError(faults)
+        vars(self).update(problem=posed.problem, tolerances=Table({n: float(t) for n, t in tolerances.items()}))
 
 
-def plan_study(asked: Study | Sampling, progress: Listener | None = None, store: Path | None = None) -> Study:
-    """The study with all its rows; for a Monte Carlo study, its nominal design is solved first.
+def prepare_study(request: Study | Sampling, progress: Listener | None = None, store: Path | None = None) -> Study:
+    """The study with all its rows; the nominal design of a Monte Carlo study is solved first.
 
     Args:
-        store: the store that the rows will go to, if it must not be the one of another study.
+        store: the store for the rows; if it exists, it must belong to this study.
 
     Raises:
         NotSolved: if the nominal design is not found.
-        InputError: if the tolerances take the design out of its physical range, or for the store of another study.
+        InputError: if a tolerance exceeds the physical range of a parameter, or the store belongs to another study.
     """
-    if isinstance(asked, Study):
-        return asked
+    if isinstance(request, Study):
+        return request
     if store is not None and store.exists():
-        _check_unchanged(asked, store)
-    solution = solve(asked.problem, starts=asked.starts, progress=progress, interruptible=False)
-    return _draw_around(asked, solution, progress)
+        _check_store_matches(request, store)
+    solution = solve(request.problem, starts=request.starts, progress=progress, interruptible=False)
+    return _draw_around_optimum(request, solution, progress)
 
 
 def monte_carlo(
@@ -103,19 +106,19 @@ def monte_carlo(
     report: Sequence[str] = (),
     progress: Listener | None = None,
 ) -> Study:
-    """The study of `rows` designs drawn around one, with nothing free.
+    """A study of `rows` random designs around a nominal design; all parameters of each row are fixed.
 
-    Each parameter with a tolerance is drawn independently; the others stay. Inequalities and scenarios stay too, and a
-    row that violates one is infeasible. Equalities and a pattern to locate are left out, because no drawn design
-    satisfies them. A longer study begins with the rows of a shorter one.
+    Each parameter with a tolerance is drawn independently; the others keep their values. Scenarios and inequalities are
+    kept, and a row that violates an inequality is infeasible. Equalities and the pattern to locate are left out,
+    because no random design satisfies them. With the same seed, a longer study begins with the rows of a shorter one.
 
     Args:
         design: a solution, or a problem or its file, which is solved first.
         tolerances: parameter → largest error in either direction; by default those of the design's problem.
-        progress: called with a `tmsopt.Progress` now and then.
+        progress: called from time to time with a `tmsopt.Progress`.
 
     Raises:
-        NotSolved: for a design that is not optimal.
+        NotSolved: if the nominal design is not optimal.
         InputError: listing all faults.
 
     Example:
@@ -127,72 +130,72 @@ def monte_carlo(
     More: docs/tutorials/study.md
     """
     solution = solve_if_needed(design, progress)
-    asked = Sampling(solution.problem, rows, seed, distribution, tolerances or {}, title, report=report)
-    return _draw_around(asked, solution, progress)
+    request = Sampling(solution.problem, rows, seed, distribution, tolerances or {}, title, report=report)
+    return _draw_around_optimum(request, solution, progress)
 
 
-def _draw_around(asked: Sampling, solution: Solution, progress: Listener | None) -> Study:
+def _draw_around_optimum(request: Sampling, solution: Solution, progress: Listener | None) -> Study:
     start_steps(progress, "drawing designs")
     if solution.status != "optimal":
         raise NotSolved(solution)
-    return _draw_study(asked, solution.parameters)
+    return _draw_study(request, solution.parameters)
 
 
-def _draw_study(asked: Sampling, design: Mapping[str, float]) -> Study:
-    """The study around a design, without equalities and pattern.
+def _draw_study(request: Sampling, design: Mapping[str, float]) -> Study:
+    """The study around a design, without its equalities and its pattern.
 
     Raises:
-        InputError: if the tolerances take the design out of its physical range.
+        InputError: if a tolerance exceeds the physical range of a parameter.
     """
-    problem, faults = asked.problem, list[Fault]()
-    equal = [name for name, condition in problem.posed.conditions.items() if condition.equality]
-    kept = {n: text for n, text in problem.constraints.items() if n not in equal}
-    built = replace(problem, fixed=design, free={}, start={}, tolerances={}, locate=None, constraints=kept)
-    for name, value in asked.tolerances.items():
+    problem, faults = request.problem, list[Fault]()
+    equalities = [name for name, condition in problem.posed.conditions.items() if condition.equality]
+    inequalities = {n: text for n, text in problem.constraints.items() if n not in equalities}
+    nominal = replace(problem, fixed=design, free={}, start={}, tolerances={}, locate=None, constraints=inequalities)
+    for name, value in request.tolerances.items():
         try:
-            replace(built, tolerances={name: value})
+            replace(nominal, tolerances={name: value})
         except InputError as error:
             faults += error.faults
     if faults:
         raise InputError(faults)
-    errors = _errors(len(asked.tolerances), asked.rows, asked.seed, asked.distribution)
-    each = zip(asked.tolerances.items(), errors, strict=True)
-    left_out = ", ".join([*equal, *([f"the pattern {problem.locate}"] if problem.locate else [])])
+    errors = _draw_errors(len(request.tolerances), request.rows, request.seed, request.distribution)
+    draws = zip(request.tolerances.items(), errors, strict=True)
+    omissions = ", ".join([*equalities, *([f"the pattern {problem.locate}"] if problem.locate else [])])
     return Study(
-        problem=built,
-        columns={name: Column(built.fixed[name] + tolerance * error) for (name, tolerance), error in each},
-        title=asked.title or problem.title,
-        seed=asked.seed,
-        report=asked.report,
+        problem=nominal,
+        columns={name: Column(nominal.fixed[name] + tolerance * error) for (name, tolerance), error in draws},
+        title=request.title or problem.title,
+        seed=request.seed,
+        report=request.report,
         method="monte_carlo",
-        notes=[f"left out, because no drawn design satisfies it exactly: {left_out}"] if left_out else [],
+        notes=[f"left out, because no drawn design satisfies it exactly: {omissions}"] if omissions else [],
     )
 
 
-def _check_unchanged(asked: Sampling, store: Path) -> None:
-    """Refuse the store of another Monte Carlo study before the nominal design is solved.
+def _check_store_matches(request: Sampling, store: Path) -> None:
+    """Check, before the nominal design is solved, that the store belongs to this Monte Carlo study.
 
-    The study is compared with the store around the design of the store, so only other differences count.
+    The comparison uses the nominal design that is saved in the store, so a change of that design is not noticed here.
 
     Raises:
         InputError: with the differences; also if the file is not a store, or damaged.
     """
-    with view_store(store) as opened:
-        known = opened.about()["definition"]
+    with view_store(store) as content:
+        definition = content.about()["definition"]
     try:
-        design = {n: float(known["problem"]["fixed"][n]) for n in asked.problem.posed.parameter_set.names}
-        drawn = _draw_study(asked, {**design, **asked.problem.fixed})
-    except (InputError, KeyError, TypeError, ValueError):  # of another model, or the tolerances do not fit the design
+        design = {n: float(definition["problem"]["fixed"][n]) for n in request.problem.posed.parameter_set.names}
+        study = _draw_study(request, {**design, **request.problem.fixed})
+    except (InputError, KeyError, TypeError, ValueError):  # the design is of another model, which is reported later
         return
-    check_same(store, drawn)
+    check_same(store, study)
 
 
 def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:
-    """Faults of the tolerances."""
+    """Faults of tolerances that may be of any type."""
     if not isinstance(tolerances, Mapping) or not tolerances:
-        found = f"found {short(tolerances)}" if tolerances else "no tolerances"
+        text = f"found {short(tolerances)}" if tolerances else "no tolerances"
         accepted = "parameters with their largest error, such as lambda_s = 0.01"
-        return [Fault(f"{found}; accepted: {accepted}", ("tolerances",))]
+        return [Fault(f"{text}; accepted: {accepted}", ("tolerances",))]
     names = problem.parameter_set.names
     faults, advice = [], limit_advice(suggest)
     for name, value in tolerances.items():
@@ -207,12 +210,12 @@ def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:
     return faults
 
 
-def _errors(parameters: int, rows: int, seed: int, distribution: str) -> NDArray[np.float64]:
+def _draw_errors(parameters: int, rows: int, seed: int, distribution: str) -> NDArray[np.float64]:
     """Errors relative to the tolerances, from −1 to 1, shape (parameters, rows)."""
-    shares = np.random.default_rng(seed).random((rows, parameters)).T
+    uniform = np.random.default_rng(seed).random((rows, parameters)).T
     if distribution == "uniform":
-        return np.asarray(2 * shares - 1)
+        return np.asarray(2 * uniform - 1)
     from scipy.special import ndtr, ndtri
 
-    low = ndtr(-_DEVIATIONS)
-    return np.clip(ndtri(low + shares * (1 - 2 * low)) / _DEVIATIONS, -1, 1)
+    low = ndtr(-_DEVIATIONS_PER_TOLERANCE)
+    return np.clip(ndtri(low + uniform * (1 - 2 * low)) / _DEVIATIONS_PER_TOLERANCE, -1, 1)

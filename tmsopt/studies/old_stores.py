@@ -1,6 +1,7 @@
-"""Stores of tmsopt 1.0 and 1.1 (schemas 1 and 2) as columns.
+"""Reads stores of tmsopt 1.0 and 1.1 (schemas 1 and 2).
 
-Schema 1 has a line of JSON for each row. Schema 2 also has blocks of rows evaluated together, with columns as bytes.
+Schema 1 has a line of JSON for each row. Schema 2 also has blocks of rows that were evaluated together; a block is a
+line of JSON, its head, and columns as bytes.
 """
 
 import sqlite3
@@ -12,10 +13,10 @@ import numpy as np
 
 from tmsopt.files import from_json
 from tmsopt.studies.rows import Batch, Row, batch_rows
-from tmsopt.studies.solving import evaluated_batch
+from tmsopt.studies.solving import build_evaluated_batch
 
-_LONGEST = 1_000_000  # characters of a row, or of the head of a block
-_CHUNK = 1000  # rows copied at once
+_MAX_LINE = 1_000_000  # largest number of characters of a row, or of the head of a block
+_CHUNK_ROWS = 1000  # number of rows that are copied at once
 
 
 def read_columns(old: sqlite3.Connection) -> dict[str, bytes]:
@@ -24,8 +25,8 @@ def read_columns(old: sqlite3.Connection) -> dict[str, bytes]:
     Raises:
         zlib.error: for damaged columns.
     """
-    found = old.execute("SELECT name, doubles FROM columns").fetchall()
-    return {name: zlib.decompress(doubles) for name, doubles in found}
+    columns = old.execute("SELECT name, doubles FROM columns").fetchall()
+    return {name: zlib.decompress(doubles) for name, doubles in columns}
 
 
 def read_batches(old: sqlite3.Connection) -> Generator[Batch]:
@@ -35,8 +36,8 @@ def read_batches(old: sqlite3.Connection) -> Generator[Batch]:
         ValueError, KeyError, TypeError: for damaged rows.
     """
     with closing(old.execute("SELECT data FROM rows ORDER BY number")) as lines:
-        while some := lines.fetchmany(_CHUNK):
-            yield batch_rows([Row.from_json(from_json(data, _LONGEST)) for (data,) in some])
+        while chunk := lines.fetchmany(_CHUNK_ROWS):
+            yield batch_rows([Row.from_json(from_json(data, _MAX_LINE)) for (data,) in chunk])
     if old.execute("SELECT 1 FROM sqlite_schema WHERE name = 'blocks'").fetchall():
         with closing(old.execute("SELECT data FROM blocks ORDER BY first")) as blocks:
             for (data,) in blocks:
@@ -44,10 +45,10 @@ def read_batches(old: sqlite3.Connection) -> Generator[Batch]:
 
 
 def _unpack_block(data: bytes) -> Batch:
-    """A block: a line of JSON, the numbers of the rows, and the columns."""
-    line, _, rest = data.partition(b"\n")
-    head = from_json(line.decode(), _LONGEST)
+    """The rows of a block: its head, the row numbers, and the columns."""
+    line, _, body = data.partition(b"\n")
+    head = from_json(line.decode(), _MAX_LINE)
     count = int(head["rows"])
-    numbers, *columns = np.frombuffer(rest, "<f8").reshape(-1, count)
-    given = {name: values for name, values in zip(head["columns"], columns, strict=True) if name[:7] != "varied."}
-    return evaluated_batch(numbers.view("<i8"), given, float(head["seconds"]), str(head["host"]))
+    numbers, *columns = np.frombuffer(body, "<f8").reshape(-1, count)
+    table = {name: values for name, values in zip(head["columns"], columns, strict=True) if name[:7] != "varied."}
+    return build_evaluated_batch(numbers.view("<i8"), table, float(head["seconds"]), str(head["host"]))

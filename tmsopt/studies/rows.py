@@ -1,4 +1,4 @@
-"""The rows of a study: one row as plain data, many as NumPy columns."""
+"""The rows of a study: a single row is plain data, many rows are NumPy columns."""
 
 import json
 import math
@@ -19,16 +19,16 @@ from tmsopt.search.solve import UNSTABLE
 from tmsopt.studies.study import Study
 
 STATUSES = ("optimal", "infeasible", "not_converged", "failed", "quarantined")
-"""Statuses of a row: those of a solution, ``failed`` for an invalid problem or an error of the solver, ``quarantined``
-for a row that ended its worker twice."""
+"""Statuses of a row: the three of a solution, ``failed`` for an invalid problem or an error of the solver, and
+``quarantined`` for a row that ended its worker process twice."""
 
 BLOCK = 10_000
-"""Rows that are read or written at once."""
+"""Number of rows that are read or written at once."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """The result of one row of a study; a failure is a row with a cause.
+    """The result of one row of a study; a failed row has a cause.
 
     Attributes:
         number: number of the row, from 0.
@@ -36,17 +36,17 @@ class Row:
         varied: name → value in this row (rad, SI units).
         status: one of `STATUSES`.
         cause: why the status is not ``optimal``, else empty.
-        objective: value of the objective; nan without one.
+        objective: value of the objective; nan if there is none.
         abscissa, abscissa_realised: as in `Solution`; rows of older stores have only the first.
         parameters: every parameter of the problem's parameter set.
         reports: values of the reported expressions.
-        bound: a value that no design within the limits can beat; −inf if unknown.
+        bound: no design within the limits has a better objective than this value; −inf if unknown.
         method: how the bound was found, or ``none``.
         laws: label of a law of the paper → relative residual, where the law applies.
-        violations: name → amount of violation in its own unit (rad, SI); inf where it has no value.
+        violations: constraint → amount of violation in its unit (rad, SI); inf where the constraint has no value.
         starts: number of starts tried.
-        warm: whether it was started from a neighbour's optimum.
-        seconds, host: time and machine; only these differ when a row is solved again.
+        warm: whether the search started from the optimum of a neighbour.
+        seconds, host: time and machine; only these two differ when a row is solved again.
 
     Example:
         >>> row = tmsopt.run_study(tmsopt.over_grid("problems/ep4.toml", {"mu": [0.3]}), workers=1).rows[0]
@@ -81,16 +81,16 @@ class Row:
 
     @property
     def stable(self) -> bool | None:
-        """Whether all roots lie left of the axis, both ideal and as stored; None without roots."""
+        """Whether all roots lie left of the imaginary axis, in exact arithmetic and as stored; None without roots."""
         return None if not math.isfinite(self.abscissa) else self.abscissa < 0 and not self.abscissa_realised >= 0
 
     @property
     def identity(self) -> str:
-        """Everything but `seconds` and `host`, as text."""
+        """All fields except `seconds` and `host`, as text."""
         return json.dumps(self.to_json() | {"seconds": None, "host": None}, sort_keys=True)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``: None for nan or an unknown bound, text such as ``"-inf"`` for infinities."""
+        """Plain data for ``json.dumps``; nan and an unknown bound are None, infinity is a text such as ``"-inf"``."""
         data = {f.name: _to_json(f.type(getattr(self, f.name)), f.default) for f in _FIELDS}
         return data | {"stable": self.stable}
 
@@ -99,7 +99,7 @@ class Row:
         """The row from the data of `to_json`.
 
         Raises:
-            ValueError: for other data.
+            ValueError: if the data are not those of a row.
         """
         try:
             row = Row(**{f.name: f.type(_from_json(data[f.name])) for f in _FIELDS if data.get(f.name) is not None})
@@ -113,12 +113,12 @@ class Row:
 _FIELDS: Sequence[Any] = fields(Row)
 
 
-def _to_json(value: Any, absent: Any = math.nan) -> Any:
+def _to_json(value: Any, default: Any = math.nan) -> Any:
     if isinstance(value, Mapping):
         return {name: _to_json(number) for name, number in value.items()}
     if not isinstance(value, float) or math.isfinite(value):
         return value
-    return None if math.isnan(value) or value == absent else str(value)
+    return None if math.isnan(value) or value == default else str(value)
 
 
 def _from_json(value: Any) -> Any:
@@ -128,27 +128,27 @@ def _from_json(value: Any) -> Any:
 
 
 PREFIXES = {"varied": "varied.", "parameters": "", "reports": "report.", "laws": "law.", "violations": "violation."}
-"""Table of a row → prefix of its headers. Parameters have none, except one with the name of a field, such as ``seed``,
-which is ``parameter.seed``. The header of a value thus depends only on its name."""
+"""Field of a row that is a table → prefix of the headers of its columns. Parameters have no prefix, unless a parameter
+has the name of a field: ``seed`` becomes ``parameter.seed``. So the header depends only on the name."""
 
 SAVED: Mapping[str, Any] = {f.name: f.type for f in _FIELDS if f.name not in (*PREFIXES, "seed")}
-"""Field with one value → type; without the seed, which follows from the study."""
+"""Field with a single value → type; the seed is left out, because it follows from the study."""
 
 _ORDER = [f.name for f in _FIELDS]
 _ORDER.insert(_ORDER.index("structure") + 1, "stable")
 
 Batch = dict[str, NDArray[Any]]
-"""Columns of some rows by header: all of `SAVED`, and numbers of the tables, nan where absent; columns that follow from
-the study may be missing."""
+"""Header → column of some rows. It has all fields of `SAVED`, and the numbers of the tables, nan where a row has none.
+Columns that follow from the study may be missing."""
 
 
 def header(table: str, key: str) -> str:
-    """Header of a name in a table of the rows."""
+    """Header of the column for a key in a table of the rows."""
     return f"parameter.{key}" if table == "parameters" and key in _ORDER else f"{PREFIXES[table]}{key}"
 
 
 def headers(study: Study) -> dict[str, tuple[str, str]]:
-    """Header of every column of a study's rows → field of the row, and the name in it if the field is a table."""
+    """Header of every column of a study → field of the row, and the key in it if the field is a table, else empty."""
     problem = study.problem.posed
     names = {
         "varied": tuple(study.columns),
@@ -157,19 +157,19 @@ def headers(study: Study) -> dict[str, tuple[str, str]]:
         "laws": LAWS if problem.model is tms else (),
         "violations": (*problem.constraints, *problem.located[1:], "a0", "coefficients"),
     }
-    found: dict[str, tuple[str, str]] = {}
+    sources: dict[str, tuple[str, str]] = {}
     for name in _ORDER:
-        found |= {header(name, key): (name, key) for key in names[name]} if name in names else {name: (name, "")}
-    return found
+        sources |= {header(name, key): (name, key) for key in names[name]} if name in names else {name: (name, "")}
+    return sources
 
 
 def column_of(values: Sequence[Any], kind: type) -> NDArray[Any]:
-    """Values of one type as an array, texts as objects."""
+    """Values of one type as an array; texts become objects."""
     return np.array(values, dtype=object if kind is str else kind)
 
 
 def blank_batch(count: int) -> Batch:
-    """Rows with default values."""
+    """Columns of rows with default values."""
     return {name: column.repeat(count) for name, column in batch_rows([Row(0, 0, Table(), "")]).items()}
 
 
@@ -184,7 +184,7 @@ def batch_rows(rows: Sequence[Row]) -> Batch:
 
 
 def _merge(batches: Sequence[Batch]) -> Batch:
-    """All batches as one, by ascending number; empties the batches to save memory."""
+    """Merge batches into one, sorted by row number; empties the batches to save memory."""
     counts = [len(batch["number"]) for batch in batches]
     order = np.argsort(np.concatenate([batch["number"] for batch in batches]), kind="stable")
     return {
@@ -196,7 +196,7 @@ def _merge(batches: Sequence[Batch]) -> Batch:
 
 
 class RowTable(Sequence[Row]):
-    """Rows of a study by ascending number.
+    """Rows of a study, sorted by number.
 
     Values that follow from the study are computed on demand: seeds, varied values, and the parameters of rows evaluated
     without a solver.
@@ -211,9 +211,9 @@ class RowTable(Sequence[Row]):
 
     def __init__(self, study: Study, batches: Sequence[Batch]) -> None:
         self.study, self.headers = study, headers(study)
-        self._kept = _merge([blank_batch(0), *batches])
-        self.numbers: NDArray[np.int64] = self._kept["number"]
-        status = self._kept["status"]
+        self._columns = _merge([blank_batch(0), *batches])
+        self.numbers: NDArray[np.int64] = self._columns["number"]
+        status = self._columns["status"]
         self._unsolved = (status == "failed") | (status == "quarantined")
 
     def __len__(self) -> int:
@@ -225,10 +225,10 @@ class RowTable(Sequence[Row]):
     @overload
     def __getitem__(self, where: slice) -> tuple[Row, ...]: ...
 
-    def __getitem__(self, where: int | slice) -> Row | tuple[Row, ...]:
-        if isinstance(where, slice):
-            return tuple(self._rows(where))
-        place = range(len(self))[where]
+    def __getitem__(self, index: int | slice) -> Row | tuple[Row, ...]:
+        if isinstance(index, slice):
+            return tuple(self._rows(index))
+        place = range(len(self))[index]
         return self._rows(slice(place, place + 1))[0]
 
     def __iter__(self) -> Iterator[Row]:
@@ -258,42 +258,42 @@ class RowTable(Sequence[Row]):
         return rows
 
     @cached_property
-    def _causes(self) -> NDArray[Any]:
-        """Why rows are not optimal; computed from the numbers for rows evaluated without a solver."""
-        texts, problem, unstable = self._kept["cause"], self.study.problem.posed, np.zeros(len(self), dtype=bool)
-        evaluated = (self._kept["status"] == "infeasible") & (texts == "")
+    def _full_causes(self) -> NDArray[Any]:
+        """Why each row is not optimal; for rows evaluated without a solver, computed from their violations."""
+        texts, problem, unstable = self._columns["cause"], self.study.problem.posed, np.zeros(len(self), dtype=bool)
+        evaluated = (self._columns["status"] == "infeasible") & (texts == "")
         for name, condition in problem.conditions.items():
             unit, amounts = unit_of(problem, name), self.column(header("violations", name))
             violated = np.flatnonzero(evaluated & ~amounts.mask)
             for k, amount in zip(violated.tolist(), amounts[violated].tolist(), strict=True):
                 texts[k] += f"{', ' if texts[k] else 'violated: '}{name} by {unit.show(amount, 3)}"
             if "abscissa" in condition.names:
-                unstable[violated] = self._kept["abscissa"][violated] >= 0
+                unstable[violated] = self._columns["abscissa"][violated] >= 0
         texts[unstable] += f"; {UNSTABLE}"
         return texts
 
     def values(self, head: str) -> NDArray[Any]:
-        """One column, nan where a row has no value."""
+        """One column; nan where a row has no value."""
         column = self.column(head)
         return np.where(column.mask, np.nan, column.data) if column.mask.any() else column.data
 
     def column(self, head: str, place: slice = slice(None)) -> Any:
         """One column, or a slice of it, as a masked array; a row without a value is masked."""
         (name, key), numbers, study = self.headers[head], self.numbers[place], self.study
-        values = self._kept[head][place] if head in self._kept else np.full(len(numbers), np.nan)
+        values = self._columns[head][place] if head in self._columns else np.full(len(numbers), np.nan)
         absent: Any = False
         match name:
             case "seed":
                 values = column_of([study.seed_of(number) for number in numbers.tolist()], int)
             case "cause":
-                values = self._causes[place]
+                values = self._full_causes[place]
             case "stable":
-                ideal, realised = self._kept["abscissa"][place], self._kept["abscissa_realised"][place]
+                ideal, realised = self._columns["abscissa"][place], self._columns["abscissa_realised"][place]
                 values, absent = (ideal < 0) & ~(realised >= 0), ~np.isfinite(ideal)
             case "varied" | "parameters":
                 column = study.columns.get(key)
-                given = study.problem.fixed.get(key, np.nan) if column is None else np.asarray(column)[numbers]
-                values = np.where(np.isnan(values), given, values)
+                study_values = study.problem.fixed.get(key, np.nan) if column is None else np.asarray(column)[numbers]
+                values = np.where(np.isnan(values), study_values, values)
             case "laws" | "violations":
                 absent = np.isnan(values)
         return np.ma.array(values, mask=self._unsolved[place] if name in ("parameters", "reports") else absent)

@@ -1,4 +1,4 @@
-"""Run a study: an executor solves its rows into a store."""
+"""Runs a study: an executor solves its rows, and a store saves them."""
 
 import time
 from collections.abc import Generator, Mapping
@@ -18,7 +18,7 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Printable, Table, frame
 from tmsopt.studies.export import build_grid_dataset, export
 from tmsopt.studies.files import load_study
-from tmsopt.studies.monte_carlo import Sampling, plan_study
+from tmsopt.studies.monte_carlo import Sampling, prepare_study
 from tmsopt.studies.rows import Batch, Row, RowTable, batch_rows
 from tmsopt.studies.solving import Solver, can_evaluate, evaluate_rows, split_into_blocks
 from tmsopt.studies.store import Store, open_store, store_error, view_store
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-_COMMIT = 1.0
-"""Seconds between transactions: a kill loses at most this much work, and a transaction takes some 30 times less."""
+_COMMIT_SECONDS = 1.0
+"""Seconds between transactions; a kill loses at most the work of this time. A transaction takes about 1/30 of it."""
 
-_FEW = 32  # most rows for which no workers are started by default, because workers take seconds to start
+_MAX_ROWS_WITHOUT_WORKERS = 32  # up to this number of rows, starting workers would take longer than solving the rows
 
 
 @dataclass(frozen=True, repr=False)
@@ -41,13 +41,13 @@ class Results(Printable):
     """A study with its rows.
 
     Attributes:
-        rows: all rows, or those solved so far if the study was stopped.
+        rows: all rows; if the study was stopped, the rows solved until then.
         solved: number of rows solved by this call; the others were in the store.
-        seconds: time that they took.
-        engine: ``in process``, ``2 processes`` or the address of a cluster; empty if nothing was left to solve.
+        seconds: time that the solved rows took.
+        engine: ``in process``, ``2 processes`` or the address of a cluster; empty if no row was solved.
         found: number of rows that were in the store.
-        about: metadata for exports: the definition of the study, and when, where and with which versions a store was
-            made.
+        about: metadata for exports: the definition of the study; the time, the machine and the versions with which the
+            store was made.
 
     Example:
         >>> study = tmsopt.over_grid("problems/ep4.toml", {"zeta_B": [-0.45, -0.8]})
@@ -71,7 +71,7 @@ class Results(Printable):
             vars(self).update(rows=RowTable(self.study, [batch_rows(self.rows)]))
 
     def column(self, name: str) -> NDArray[Any]:
-        """The values of one column, one per row, nan where absent.
+        """The values of one column, one for each row; nan where a row has none.
 
         Args:
             name: header of an exported file: a field such as ``status`` or ``abscissa``, a parameter, or
@@ -86,7 +86,7 @@ class Results(Printable):
 
     @property
     def summary(self) -> Summary:
-        """Counts, best row, spread and causes, and the yield of a Monte Carlo study."""
+        """Counts, best row, spread and causes, and for a Monte Carlo study the yield."""
         return summarise(self.rows)
 
     def to_frame(self) -> "DataFrame":
@@ -109,7 +109,7 @@ class Results(Printable):
         return dataset
 
     def to_json(self, table: bool = True) -> dict[str, Any]:
-        """Plain data for ``json.dumps``: the summary, and the rows as ``table`` (empty if not wanted)."""
+        """Plain data for ``json.dumps``: the summary, and the rows as ``table``, which is empty without `table`."""
         head = {"schema": SCHEMA, "title": self.study.title, "model": self.study.problem.model.name}
         rows = [row.to_json() for row in self.rows] if table else []
         return head | {"method": self.study.method} | self.summary.to_json() | {"table": rows}
@@ -131,22 +131,23 @@ def run_study(
     progress: Listener | None = None,
     note: Note = ignore_note,
 ) -> Results:
-    """Solve every row of a study that its store does not have yet.
+    """Solve every row of a study that is not in its store yet.
 
-    The rows do not depend on the number of workers or the order of solving.
+    The rows do not depend on the number of workers, nor on the order in which they are solved.
 
     Args:
         study: a study, or the path of its file.
         store: path of an SQLite file that saves solved rows once a second, so that the same call continues after an
-            interruption; without it rows are kept in memory only.
-        workers: processes on this machine; 1 solves in this process. By default one per core, or 1 for few rows.
-        scheduler: address of a Dask scheduler, such as ``tcp://host:8786``, in place of workers.
+            interruption; without a store, rows are kept in memory only.
+        workers: number of processes on this machine; 1 solves in this process. The default is one per core, or 1 for
+            few rows.
+        scheduler: address of a Dask scheduler, such as ``tcp://host:8786``; it replaces the workers.
         fresh: move an existing store aside and start a new one.
-        progress: called with a `tmsopt.Progress` now and then, first with the rows found in the store.
-        note: called with lines about the store, and about workers that end.
+        progress: called from time to time with a `tmsopt.Progress`, first with the number of rows in the store.
+        note: called with lines about the store, and about workers that end unexpectedly.
 
     Raises:
-        InputError: for a store of another study, or invalid arguments.
+        InputError: if the store belongs to another study, or an argument is invalid.
         NotSolved: if the nominal design of a Monte Carlo study is not found.
 
     Example:
@@ -158,39 +159,39 @@ def run_study(
 
     More: docs/tutorials/study.md
     """
-    stated = load_study(study) if isinstance(study, str | PathLike) else study
-    found = call_faults("progress", progress)
-    if not isinstance(stated, Study | Sampling):
+    request = load_study(study) if isinstance(study, str | PathLike) else study
+    faults = call_faults("progress", progress)
+    if not isinstance(request, Study | Sampling):
         accepted = "a Study, such as from tmsopt.over_grid, or the path of a study file"
-        found.append(Fault(f"found {short(stated)}; accepted: {accepted}", ("study",)))
+        faults.append(Fault(f"found {short(request)}; accepted: {accepted}", ("study",)))
     if workers is not None:
-        found += count_faults("workers", workers, 1)
-    if found:
-        raise InputError(found)
+        faults += count_faults("workers", workers, 1)
+    if faults:
+        raise InputError(faults)
     path = None if store is None else as_path(store, "an SQLite file")
-    planned = plan_study(stated, progress, None if fresh else path)
+    full_study = prepare_study(request, progress, None if fresh else path)
     if path is None:
-        return _complete(planned, None, workers, scheduler, note, progress)
+        return _complete(full_study, None, workers, scheduler, note, progress)
     start_steps(progress, "waiting for the store")
-    with open_store(path, planned, fresh=fresh) as opened:
-        for line in opened.warnings:
+    with open_store(path, full_study, fresh=fresh) as opened_store:
+        for line in opened_store.warnings:
             note(line)
-        return _complete(planned, opened, workers, scheduler, note, progress)
+        return _complete(full_study, opened_store, workers, scheduler, note, progress)
 
 
 def read_results(study: Study, store: str | PathLike[str]) -> Results:
-    """Read the rows of a study from its store, even while another process writes it.
+    """Read the rows of a study from its store; another process may write it at the same time.
 
     Raises:
         InputError: if there is no store.
     """
-    with view_store(as_path(store, "an SQLite file")) as opened:
-        rows = RowTable(study, _read_batches(study, opened))
-        return Results(study, rows, 0, 0.0, "", len(rows), opened.about())
+    with view_store(as_path(store, "an SQLite file")) as opened_store:
+        rows = RowTable(study, _read_batches(study, opened_store))
+        return Results(study, rows, 0, 0.0, "", len(rows), opened_store.about())
 
 
 def _read_batches(study: Study, store: Store) -> list[Batch]:
-    """All rows of a store.
+    """Read all rows of a store.
 
     Raises:
         InputError: for a row number outside the study, or a damaged store.
@@ -211,79 +212,82 @@ def _complete(
     note: Note,
     progress: Listener | None,
 ) -> Results:
-    """Read the rows of the store, if any, solve the missing ones and store them."""
+    """Read the rows of the store, if there is one; solve the missing rows and store them."""
     batches, missing, engine = list[Batch](), np.ones(len(study), dtype=bool), ""
     if store is not None:
         start_steps(progress, "reading the store")
-        batches = _read_batches(study, store)  # report damage before any work
+        batches = _read_batches(study, store)  # a damaged store is reported before any work
         for batch in batches:
             missing[batch["number"]] = False
-    found = count = len(study) - int(missing.sum())
-    if found and store is not None:
-        note(f"{found} of {len(study)} rows are in {store.path}")
-    began, steps = time.perf_counter(), start_steps(progress, "solving rows", "row")
+    stored_count = count = len(study) - int(missing.sum())
+    if stored_count and store is not None:
+        note(f"{stored_count} of {len(study)} rows are in {store.path}")
+    start_time, steps = time.perf_counter(), start_steps(progress, "solving rows", "row")
 
-    def show(more: int) -> None:
+    def report_rows(increment: int) -> None:
         nonlocal count
-        count += more
+        count += increment
         if steps:
             steps(count, len(study))
 
-    def keep(batch: Batch) -> None:
+    def save_batch(batch: Batch) -> None:
         if store is not None:
             store.add(batch)
         batches.append(batch)
         missing[batch["number"]] = False
 
-    if found < len(study):
-        show(0)
+    if stored_count < len(study):
+        report_rows(0)
         if can_evaluate(study):
             engine = "in process"
             for batch in evaluate_rows(study, np.flatnonzero(missing)):
-                keep(batch)
-                show(len(batch["number"]))
+                save_batch(batch)
+                report_rows(len(batch["number"]))
     if missing.any():
-        left, fresh, last = set(np.flatnonzero(missing).tolist()), list[Row](), time.perf_counter()
-        executor = _choose_executor(len(left), workers, scheduler, note)
+        remaining, new_rows, last_commit = set(np.flatnonzero(missing).tolist()), list[Row](), time.perf_counter()
+        executor = _choose_executor(len(remaining), workers, scheduler, note)
         engine = executor.name
         try:
-            with executor, closing(_solve_rows(study, left, executor, note)) as rows:
+            with executor, closing(_solve_rows(study, remaining, executor, note)) as rows:
                 for row in rows:
-                    fresh.append(row)
-                    show(1)
-                    if time.perf_counter() - last >= _COMMIT:
-                        keep(batch_rows(fresh))
-                        fresh, last = [], time.perf_counter()
+                    new_rows.append(row)
+                    report_rows(1)
+                    if time.perf_counter() - last_commit >= _COMMIT_SECONDS:
+                        save_batch(batch_rows(new_rows))
+                        new_rows, last_commit = [], time.perf_counter()
         finally:
-            keep(batch_rows(fresh))  # also after an interruption
-    seconds = time.perf_counter() - began if engine else 0.0
+            save_batch(batch_rows(new_rows))  # also after an interruption
+    seconds = time.perf_counter() - start_time if engine else 0.0
     about = {} if store is None else store.about()
-    return Results(study, RowTable(study, batches), count - found, seconds, engine, found, about)
+    return Results(study, RowTable(study, batches), count - stored_count, seconds, engine, stored_count, about)
 
 
 def _choose_executor(count: int, workers: int | None, scheduler: str | None, note: Note) -> Executor:
     """The executor for a number of rows."""
     if scheduler is not None:
         return cluster(scheduler, note)
-    workers = workers or (1 if count <= _FEW else cores())
+    workers = workers or (1 if count <= _MAX_ROWS_WITHOUT_WORKERS else cores())
     return here() if workers == 1 else processes(workers, note)
 
 
-def _solve_rows(study: Study, left: set[int], executor: Executor, note: Note) -> Generator[Row]:
-    """Rows as they are solved. A block that ends its worker is split into rows; such a row is quarantined."""
-    blocks = split_into_blocks(study) if study.warm else [(number,) for number in sorted(left)]
-    solver, units = Solver(study), [block for block in blocks if not left.isdisjoint(block)]
+def _solve_rows(study: Study, remaining: set[int], executor: Executor, note: Note) -> Generator[Row]:
+    """Yield rows when they are solved.
+
+    If a block ends its worker process, its rows are solved one by one; a row that ends its worker is quarantined.
+    """
+    blocks = split_into_blocks(study) if study.warm else [(number,) for number in sorted(remaining)]
+    solver, units = Solver(study), [block for block in blocks if not remaining.isdisjoint(block)]
     while units:
-        split: list[tuple[int, ...]] = []
+        single_rows: list[tuple[int, ...]] = []
         with closing(executor.map(solver, units)) as answers:
             for place, answer in answers:
                 unit = units[place]
                 if not isinstance(answer, Crash):
-                    yield from (row for row in answer if row.number in left)  # part of a block may be in the store
+                    yield from (row for row in answer if row.number in remaining)  # part of a block may be in the store
                 elif len(unit) > 1:
-                    split += [(number,) for number in unit if number in left]
+                    single_rows += [(number,) for number in unit if number in remaining]
                 else:
                     note(f"row {unit[0]} is quarantined")
                     cause = f"ended its worker twice{f' ({answer.cause})' if answer.cause else ''}"
                     yield solver.row(unit[0], status="quarantined", cause=cause)
-        units = split
+        units = single_rows

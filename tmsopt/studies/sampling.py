@@ -1,4 +1,4 @@
-"""Rows of a study: every combination of values, or a sample of a box."""
+"""Rows of a study: every combination of given values, or a sample of ranges."""
 
 import inspect
 import math
@@ -12,17 +12,17 @@ from tmsopt.errors import Fault, InputError, count_faults, input_error, is_numbe
 from tmsopt.records import Array, Column
 
 MOST_ROWS = 10_000_000
-"""Most rows of a study."""
+"""Largest number of rows of a study."""
 
 MOST_NUMBERS = 40_000_000
-"""Most numbers in all columns, which are held in memory."""
+"""Largest number of values in all columns together; they are held in memory."""
 
-_DIGITS = 15  # decimal digits that every double holds
+_EXACT_DIGITS = 15  # decimal digits that every double holds
 
 
 @dataclass(frozen=True)
 class Span:
-    """A range from `low` to `high`, linear or, with `log`, logarithmic; then both ends must have the same sign.
+    """A range from `low` to `high`. With `log` it is logarithmic, and both ends must have the same sign.
 
     Example:
         >>> [round(x, 9) for x in tmsopt.Span(1, 100, log=True).points(3)]
@@ -36,21 +36,21 @@ class Span:
     log: bool = False
 
     def at(self, share: Array) -> Array:
-        """The numbers at shares from 0 to 1."""
+        """The number at each share of the range: `low` at 0, `high` at 1."""
         low, high = float(self.low), float(self.high)
-        inside = low * (high / low) ** share if self.log else low + share * (high - low)
-        return np.clip(inside, min(low, high), max(low, high))
+        numbers = low * (high / low) ** share if self.log else low + share * (high - low)
+        return np.clip(numbers, min(low, high), max(low, high))
 
     def points(self, count: int) -> list[float]:
-        """`count` numbers: exact ends, and numbers between them rounded to 15 digits, such as 0.3 for 0.1 + 0.2."""
-        inside = (np.geomspace if self.log else np.linspace)(self.low, self.high, count).tolist()[1:-1]
+        """`count` numbers: the exact ends, and numbers between them that are rounded to 15 digits, such as 0.3."""
+        numbers = (np.geomspace if self.log else np.linspace)(self.low, self.high, count).tolist()[1:-1]
         largest = max(abs(self.low), abs(self.high)) or 1.0
-        places = (_DIGITS - 1 - math.floor(math.log10(abs(value) if self.log else largest)) for value in inside)
-        return [float(self.low), *map(round, inside, places), float(self.high)]
+        places = (_EXACT_DIGITS - 1 - math.floor(math.log10(abs(value) if self.log else largest)) for value in numbers)
+        return [float(self.low), *map(round, numbers, places), float(self.high)]
 
 
 def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
-    """Every combination of the axes' values, the last axis fastest, as in `itertools.product`.
+    """Every combination of the axes' values; the last axis changes fastest, as in `itertools.product`.
 
     Raises:
         InputError: for too many rows, or an axis that is not a list of numbers.
@@ -63,70 +63,70 @@ def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
             raise input_error(message, name)
         lists.append(numbers)
     check_size([len(numbers) for numbers in lists])
-    crossed = np.meshgrid(*lists, indexing="ij")
-    return {name: Column(column.ravel()) for name, column in zip(axes, crossed, strict=True)}
+    combinations = np.meshgrid(*lists, indexing="ij")
+    return {name: Column(column.ravel()) for name, column in zip(axes, combinations, strict=True)}
 
 
 def latin_hypercube(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Column]:
     """A Latin hypercube sample: each range is divided into `rows` equal parts, with one value in each part.
 
     Args:
-        ranges: name → (least, greatest), or a `Span`.
+        ranges: name → (minimum, maximum), or a `Span`.
 
     Raises:
         InputError: listing all faults.
 
     Example:
         >>> sample = tmsopt.latin_hypercube({"mu": (0, 1), "Fr": (1, 5)}, rows=4)
-        >>> sorted(int(4 * x) for x in sample["mu"])  # one in each quarter
+        >>> sorted(int(4 * x) for x in sample["mu"])  # one value in each quarter
         [0, 1, 2, 3]
 
     More: docs/reference/study_file.md
     """
-    return _sample("LatinHypercube", ranges, rows, seed)
+    return _draw_sample("LatinHypercube", ranges, rows, seed)
 
 
 def sobol(ranges: Mapping[str, Any], rows: int, seed: int = 0) -> dict[str, Column]:
     """The first `rows` points of a scrambled Sobol sequence; see `sobol_note`.
 
     Args:
-        ranges: name → (least, greatest), or a `Span`.
+        ranges: name → (minimum, maximum), or a `Span`.
 
     Raises:
         InputError: listing all faults.
 
     Example:
         >>> sample = tmsopt.sobol({"mu": tmsopt.Span(0.01, 1, log=True)}, rows=2)
-        >>> sorted(x > 0.1 for x in sample["mu"])  # one in each half of the logarithms
+        >>> sorted(x > 0.1 for x in sample["mu"])  # one value in each half of the logarithmic range
         [False, True]
 
     More: docs/reference/study_file.md
     """
-    return _sample("Sobol", ranges, rows, seed)
+    return _draw_sample("Sobol", ranges, rows, seed)
 
 
 def sobol_note(rows: int) -> str:
-    """A note for a number of rows that is not a power of 2; else empty."""
+    """A note if the number of rows is not a power of 2; else an empty text."""
     if rows & (rows - 1) == 0:
         return ""
-    near = 2 ** round(math.log2(rows))
-    return f"a Sobol sample is evenly balanced for a power of 2; {rows} rows are not, {near} would be"
+    power = 2 ** round(math.log2(rows))
+    return f"a Sobol sample is evenly balanced for a power of 2; {rows} rows are not, {power} would be"
 
 
 def most_rows(columns: int) -> int:
-    """Most rows of a study with this number of columns."""
+    """Largest number of rows of a study with this number of columns."""
     return min(MOST_ROWS, MOST_NUMBERS // max(1, columns))
 
 
 def check_size(sizes: Sequence[int]) -> None:
-    """Refuse a grid with too many rows before it is built.
+    """Check the size of a grid before it is built.
 
     Raises:
-        InputError: with the number of rows.
+        InputError: if the grid has too many rows.
     """
-    if math.prod(sizes) > (most := most_rows(len(sizes))):
-        found = f"{' x '.join(map(str, sizes))} = {math.prod(sizes)} rows"
-        raise input_error(f"found {found}; accepted: up to {most}; take fewer points", "columns")
+    if math.prod(sizes) > (max_rows := most_rows(len(sizes))):
+        text = f"{' x '.join(map(str, sizes))} = {math.prod(sizes)} rows"
+        raise input_error(f"found {text}; accepted: up to {max_rows}; take fewer points", "columns")
 
 
 def span_faults(name: str, span: Span) -> Iterator[Fault]:
@@ -148,37 +148,37 @@ def column_of_numbers(values: Any) -> Array | None:
     """The user's values as an array of doubles; None if they are not a list of numbers."""
     try:
         array = np.asarray(None if isinstance(values, str | bytes | Mapping) else values)
-        numeric = array.ndim == 1 and (array.dtype.kind in "fiu" or not array.size)
-        return array.astype(np.float64) if numeric else None
+        is_numeric = array.ndim == 1 and (array.dtype.kind in "fiu" or not array.size)
+        return array.astype(np.float64) if is_numeric else None
     except (TypeError, ValueError, OverflowError):
         return None
 
 
-def _spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
-    if found := table_faults("ranges", ranges, "{'mu': (0.1, 0.5)}"):
-        raise InputError(found)
+def _read_spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Span]:
+    if faults := table_faults("ranges", ranges, "{'mu': (0.1, 0.5)}"):
+        raise InputError(faults)
     spans: dict[str, Span] = {}
-    for name, stated in ranges.items():
+    for name, limits in ranges.items():
         try:
-            spans[name] = stated if isinstance(stated, Span) else Span(*stated)
-            found += span_faults(name, spans[name])
+            spans[name] = limits if isinstance(limits, Span) else Span(*limits)
+            faults += span_faults(name, spans[name])
         except TypeError:
             accepted = "(least, greatest), or a tmsopt.Span"
-            found.append(Fault(f"found {short(stated)}; accepted: {accepted}", ("ranges", name)))
+            faults.append(Fault(f"found {short(limits)}; accepted: {accepted}", ("ranges", name)))
     if not ranges:
-        found.append(Fault("nothing varies; give a range", ("ranges",)))
-    found += [*count_faults("rows", rows, 1, most_rows(len(ranges))), *count_faults("seed", seed, 0)]
-    if found:
-        raise InputError(found)
+        faults.append(Fault("nothing varies; give a range", ("ranges",)))
+    faults += [*count_faults("rows", rows, 1, most_rows(len(ranges))), *count_faults("seed", seed, 0)]
+    if faults:
+        raise InputError(faults)
     return spans
 
 
-def _sample(name: str, ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Column]:
-    """Rows from a sampler of SciPy; version 1.15 renamed its argument for random numbers."""
+def _draw_sample(name: str, ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Column]:
+    """Columns from a sampler of SciPy; version 1.15 renamed its argument for random numbers."""
     from scipy.stats import qmc
 
-    spans, kind = _spans(ranges, rows, seed), getattr(qmc, name)
-    stream = "rng" if "rng" in inspect.signature(kind).parameters else "seed"
-    drawn = 2 ** math.ceil(math.log2(rows)) if name == "Sobol" else rows
-    shares = kind(len(spans), **{stream: np.random.default_rng(seed)}).random(drawn)[:rows].T
+    spans, sampler = _read_spans(ranges, rows, seed), getattr(qmc, name)
+    argument = "rng" if "rng" in inspect.signature(sampler).parameters else "seed"
+    size = 2 ** math.ceil(math.log2(rows)) if name == "Sobol" else rows
+    shares = sampler(len(spans), **{argument: np.random.default_rng(seed)}).random(size)[:rows].T
     return {name: Column(span.at(share)) for (name, span), share in zip(spans.items(), shares, strict=True)}

@@ -1,4 +1,7 @@
-"""Solve the rows of a study: one by one, warm from neighbour to neighbour, or all at once where nothing is free."""
+"""Solve the rows of a study: one by one, or from the optimum of a neighbour (warm), or all together if nothing is free.
+
+A row that is not started from a neighbour's optimum is solved cold.
+"""
 
 import math
 import platform
@@ -25,22 +28,22 @@ from tmsopt.studies.rows import PREFIXES, Batch, Row, blank_batch, column_of, he
 from tmsopt.studies.study import Study
 
 ROWS_OF_BLOCK = 32
-"""Rows of a block; the first row of each block starts cold, so that blocks are independent."""
+"""Number of rows of a block; the first row of each block is solved cold, so that blocks are independent."""
 
-_AFAR = 1
-"""Starts of a warm row besides its neighbour's optimum, which find optima that neither end of a block has."""
+_EXTRA_STARTS = 1
+"""Further starts of a warm row, next to the optimum of its neighbour; they find optima that no end of a block has."""
 
 
 @dataclass(frozen=True)
 class SolvedRow:
-    """A row and its solution; None without one."""
+    """A row and its solution; the solution is None for a failed row."""
 
     row: Row
     solution: Solution | None = None
 
 
 def solve_row(study: Study, number: int) -> SolvedRow:
-    """Solve one row as in the study; with warm starts, together with the other rows of its block.
+    """Solve one row with the same result as in the study; with warm starts, the whole block of the row is solved.
 
     Raises:
         InputError: for a row number outside the study.
@@ -52,9 +55,9 @@ def solve_row(study: Study, number: int) -> SolvedRow:
 
 @dataclass(frozen=True)
 class Solver:
-    """Solves rows of one study.
+    """Solves units of one study.
 
-    A unit is one row, or with warm starts a whole block of neighbours; a single row of a block is solved cold.
+    A unit is one row, or with warm starts a block of neighbours. If a unit is one row of a block, it is solved cold.
     """
 
     study: Study
@@ -65,41 +68,41 @@ class Solver:
 
     def answers(self, numbers: Sequence[int]) -> list[SolvedRow]:
         """The rows of a unit, each with its solution."""
-        with _pools().limit(limits=1):
+        with _thread_pools().limit(limits=1):
             if self.study.warm and len(numbers) > 1:
-                return self._block(numbers)
-            return [self._answer(number) for number in numbers]
+                return self._solve_block(numbers)
+            return [self._solve_row(number) for number in numbers]
 
-    def _block(self, numbers: Sequence[int]) -> list[SolvedRow]:
-        """Solve both ends from many starts, and the others from their neighbours and from `_AFAR` further starts.
+    def _solve_block(self, numbers: Sequence[int]) -> list[SolvedRow]:
+        """Solve both ends of a block cold, and each other row from its neighbour and from `_EXTRA_STARTS` starts.
 
-        Another optimum may become better along the block. If the last row or a further start finds it, it is carried
-        back as far as it is better.
+        Another optimum may become better along the block. If the last row or one of these starts finds it, the rows
+        before it are solved from it too, as long as it is better.
         """
-        found = [self._answer(numbers[0])]
+        answers = [self._solve_row(numbers[0])]
         for number in numbers[1:]:
-            found.append(self._answer(number, found[-1].row, _AFAR))
-        end = self._answer(numbers[-1]) if found[-1].row.warm else found[-1]
-        differs = [_may_differ(answer) for answer in found]
-        if self._is_better(end.row, found[-1].row):
-            found[-1], differs[-1] = end, True
+            answers.append(self._solve_row(number, answers[-1].row, _EXTRA_STARTS))
+        end = self._solve_row(numbers[-1]) if answers[-1].row.warm else answers[-1]
+        may_differ = [_may_differ(answer) for answer in answers]
+        if self._is_better(end.row, answers[-1].row):
+            answers[-1], may_differ[-1] = end, True
         for k in range(len(numbers) - 2, -1, -1):
-            if differs[k + 1] and found[k + 1].row.status == "optimal":
-                back = self._answer(numbers[k], found[k + 1].row)
-                if self._is_better(back.row, found[k].row):
-                    found[k], differs[k] = back, True
-        return found
+            if may_differ[k + 1] and answers[k + 1].row.status == "optimal":
+                candidate = self._solve_row(numbers[k], answers[k + 1].row)
+                if self._is_better(candidate.row, answers[k].row):
+                    answers[k], may_differ[k] = candidate, True
+        return answers
 
-    def _is_better(self, one: Row, other: Row) -> bool:
-        """Whether one solution of a row is better than another by more than rounding."""
-        if one.status != "optimal" or other.status != "optimal":
-            return one.status == "optimal" and other.status != "optimal"
+    def _is_better(self, row: Row, current: Row) -> bool:
+        """Whether a solution of a row is better than the current one by more than rounding."""
+        if row.status != "optimal" or current.status != "optimal":
+            return row.status == "optimal" and current.status != "optimal"
         sign = self.study.problem.posed.sign
-        return sign * one.objective < sign * other.objective and not same_objective(one.objective, other.objective)
+        return sign * row.objective < sign * current.objective and not same_objective(row.objective, current.objective)
 
-    def _answer(self, number: int, neighbour: Row | None = None, afar: int = 0) -> SolvedRow:
-        """Solve one row, warm from a neighbour's optimum and `afar` further starts, or cold if that fails."""
-        began, solution = time.perf_counter(), None
+    def _solve_row(self, number: int, neighbour: Row | None = None, extra_starts: int = 0) -> SolvedRow:
+        """Solve one row from a neighbour's optimum and `extra_starts` further starts; solve it cold if that fails."""
+        start_time, solution = time.perf_counter(), None
         try:
             problem = self.study.row_problem(number)
             # Slow analyses of infeasible rows are left out, and Ctrl-C stops the whole study.
@@ -107,29 +110,29 @@ class Solver:
             options["seed"] = self.study.seed_of(number)
             if neighbour is not None and neighbour.status == "optimal":
                 near = {name: neighbour.parameters[name] for name in problem.free}
-                solution = solve(problem, starts=1 + afar, near=near, **options)
+                solution = solve(problem, starts=1 + extra_starts, near=near, **options)
             warm = solution is not None and solution.status == "optimal"
             if solution is None or not warm:
                 solution = solve(problem, starts=self.study.starts, **options)
-            found = _fields(solution, self.study.report) | {"warm": warm}
+            values = _extract_fields(solution, self.study.report) | {"warm": warm}
         except InputError as error:
-            found = {"status": "failed", "cause": "; ".join(str(fault) for fault in error.faults)}
+            values = {"status": "failed", "cause": "; ".join(str(fault) for fault in error.faults)}
         except Exception as error:  # a row that breaks the program must not end a study
-            found = {"status": "failed", "cause": f"{type(error).__name__}: {error}"}
-        return SolvedRow(self.row(number, seconds=time.perf_counter() - began, **found), solution)
+            values = {"status": "failed", "cause": f"{type(error).__name__}: {error}"}
+        return SolvedRow(self.row(number, seconds=time.perf_counter() - start_time, **values), solution)
 
-    def row(self, number: int, **found: Any) -> Row:
-        """A row with what is found of it."""
-        return Row(number, self.study.seed_of(number), self.study.varied(number), host=platform.node(), **found)
+    def row(self, number: int, **values: Any) -> Row:
+        """A row with the values of its fields."""
+        return Row(number, self.study.seed_of(number), self.study.varied(number), host=platform.node(), **values)
 
 
-def _fields(solution: Solution, report: Sequence[str]) -> dict[str, Any]:
+def _extract_fields(solution: Solution, report: Sequence[str]) -> dict[str, Any]:
     """The fields of a row from its solution."""
     problem, bound = solution.problem.posed, solution.bound
     values = problem.values(solution.parameters)
     return {
         "status": solution.status,
-        "cause": _cause(solution),
+        "cause": _describe_cause(solution),
         "objective": solution.value,
         "abscissa": solution.abscissa,
         "abscissa_realised": solution.abscissa_realised,
@@ -141,28 +144,28 @@ def _fields(solution: Solution, report: Sequence[str]) -> dict[str, Any]:
         "gap": bound.gap,
         "proven": bound.proven,
         "method": bound.method,
-        "laws": Table(_laws(solution)),
+        "laws": Table(_compute_law_residuals(solution)),
         "violations": Table({n: math.inf if math.isnan(x) else x for n, x in solution.violations.items()}),
         "starts": solution.starts.tried,
     }
 
 
 @cache
-def _pools() -> ThreadpoolController:
-    """Thread pools of NumPy and SciPy, to be limited because more threads change the last digits of sums."""
+def _thread_pools() -> ThreadpoolController:
+    """Thread pools of NumPy and SciPy; they must be limited, because more threads change the last digits of sums."""
     import scipy.linalg  # noqa: F401  # has a pool of its own
 
     return ThreadpoolController()
 
 
 def _may_differ(answer: SolvedRow) -> bool:
-    """Whether a row may have another optimum than the neighbour that it was started from."""
+    """Whether a row may have another optimum than the neighbour from which it was started."""
     starts = answer.solution.starts if answer.solution is not None else None
     return starts is not None and (not answer.row.warm or starts.at_best < starts.tried)
 
 
-def _cause(solution: Solution) -> str:
-    """Why a solution is not optimal, or what the stored doubles miss."""
+def _describe_cause(solution: Solution) -> str:
+    """Why a solution is not optimal, or which constraints its stored doubles violate."""
     if solution.status == "optimal":
         amounts = amounts_text(solution.problem.posed, solution.missed)
         return f"rounded to doubles, violates {amounts}" if amounts else ""
@@ -176,7 +179,7 @@ def _cause(solution: Solution) -> str:
     return "; ".join(filter(None, causes))
 
 
-def _laws(solution: Solution) -> Mapping[str, float]:
+def _compute_law_residuals(solution: Solution) -> Mapping[str, float]:
     """Relative residual of each law that applies to an optimal design."""
     if solution.status != "optimal" or solution.problem.model is not tms:
         return {}
@@ -190,64 +193,64 @@ def can_evaluate(study: Study) -> bool:
 
 
 def evaluate_rows(study: Study, numbers: NDArray[np.int64]) -> Iterator[Batch]:
-    """Evaluate rows together; doubtful ones are omitted and must be solved one by one.
+    """Evaluate rows together; rows with an uncertain result are omitted and must be solved one by one.
 
     Args:
         numbers: numbers of the rows, ascending.
     """
     varied = {name: np.asarray(column) for name, column in study.columns.items()}
     for first in range(0, len(numbers), BLOCK):
-        began, some = time.perf_counter(), numbers[first : first + BLOCK]
-        columns = {name: column[some] for name, column in varied.items()}
-        found = evaluate_columns(study.problem.posed, columns, study.report)
-        if found is None:
+        start_time, chunk = time.perf_counter(), numbers[first : first + BLOCK]
+        columns = {name: column[chunk] for name, column in varied.items()}
+        results = evaluate_columns(study.problem.posed, columns, study.report)
+        if results is None:
             return
-        given: dict[str, Any] = {}
-        for name, value in vars(found).items():
-            given |= {header(name, n): x for n, x in value.items()} if isinstance(value, Mapping) else {name: value}
-        certain = given.pop("certain")
-        if certain.any():
-            seconds = (time.perf_counter() - began) / len(some)
-            kept = {name: values[certain] for name, values in given.items()}
-            yield evaluated_batch(some[certain], kept, seconds, platform.node())
+        table: dict[str, Any] = {}
+        for name, value in vars(results).items():
+            table |= {header(name, n): x for n, x in value.items()} if isinstance(value, Mapping) else {name: value}
+        is_certain = table.pop("certain")
+        if is_certain.any():
+            seconds = (time.perf_counter() - start_time) / len(chunk)
+            certain_table = {name: values[is_certain] for name, values in table.items()}
+            yield build_evaluated_batch(chunk[is_certain], certain_table, seconds, platform.node())
 
 
-def evaluated_batch(numbers: NDArray[np.int64], given: dict[str, Array], seconds: float, host: str) -> Batch:
+def build_evaluated_batch(numbers: NDArray[np.int64], table: dict[str, Array], seconds: float, host: str) -> Batch:
     """All columns of rows that were evaluated together.
 
     Args:
-        given: header → numbers; also ``oscillates`` and ``by_relation``, which determine structure and method.
+        table: header → numbers; also ``oscillates`` and ``by_relation``, which determine structure and method.
     """
-    violations = [values for name, values in given.items() if name.startswith(PREFIXES["violations"])]
+    violations = [values for name, values in table.items() if name.startswith(PREFIXES["violations"])]
     infeasible = np.any(~np.isnan([np.full(len(numbers), np.nan), *violations]), axis=0)
     texts = {
         "status": (("optimal", "infeasible"), infeasible),
-        "structure": (("real", "pair"), given.pop("oscillates")),
-        "method": (("none", "omega0", "relation"), np.isfinite(given["bound"]) * (1 + given.pop("by_relation"))),
+        "structure": (("real", "pair"), table.pop("oscillates")),
+        "method": (("none", "omega0", "relation"), np.isfinite(table["bound"]) * (1 + table.pop("by_relation"))),
         "host": ((host,), 0 * numbers),
     }
-    batch = blank_batch(len(numbers)) | given | {"number": numbers, "abscissa_realised": given["abscissa"]}
+    batch = blank_batch(len(numbers)) | table | {"number": numbers, "abscissa_realised": table["abscissa"]}
     batch["seconds"] = np.full(len(numbers), seconds)
-    return batch | {name: column_of(words, str)[which.astype(int)] for name, (words, which) in texts.items()}
+    return batch | {name: column_of(options, str)[indices.astype(int)] for name, (options, indices) in texts.items()}
 
 
 def split_into_blocks(study: Study, size: int = ROWS_OF_BLOCK) -> list[tuple[int, ...]]:
-    """Every row once, in blocks of `size` with close consecutive rows.
+    """Split all rows into blocks of `size`, in which consecutive rows have similar values.
 
-    A grid is traversed back and forth, so consecutive rows differ in one axis by one step. For other rows, each
-    column but the last is binned by rank and traversed in the same way. Ranks treat logarithmic and linear columns
-    alike.
+    A grid is traversed back and forth, so that consecutive rows differ in one axis by one step. For other studies, each
+    column except the last is divided into bins by rank, and the bins are traversed in the same way. Ranks treat
+    logarithmic and linear columns alike.
     """
     count = len(study)
     ranks = [np.unique(np.asarray(column), return_inverse=True)[1] for column in study.columns.values()]
-    moving = [rank for rank in ranks if rank.max() > 0]
+    axes = [rank for rank in ranks if rank.max() > 0]
     if study.grid_shape is None:
-        moving = moving[: max(1, int(math.log2(count)))]
-        bins = round(count ** (1 / max(1, len(moving))))
-        moving[:-1] = [rank * min(bins, rank.max() + 1) // (rank.max() + 1) for rank in moving[:-1]]
-    walk = np.zeros(count, dtype=np.int64)
-    for rank in moving:
-        most = rank.max()
-        walk = walk * (most + 1) + np.where(walk % 2 == 1, most - rank, rank)
-    order = np.argsort(walk, kind="stable").tolist()
+        axes = axes[: max(1, int(math.log2(count)))]
+        bins = round(count ** (1 / max(1, len(axes))))
+        axes[:-1] = [rank * min(bins, rank.max() + 1) // (rank.max() + 1) for rank in axes[:-1]]
+    position = np.zeros(count, dtype=np.int64)
+    for rank in axes:
+        max_rank = rank.max()
+        position = position * (max_rank + 1) + np.where(position % 2 == 1, max_rank - rank, rank)
+    order = np.argsort(position, kind="stable").tolist()
     return [tuple(order[k : k + size]) for k in range(0, count, size)]

@@ -1,8 +1,8 @@
 """The store of a study: one SQLite file with one writer and any number of readers.
 
-A row is a line of the table ``rows``: its fields, and the numbers of its tables as little-endian doubles in the order
-of the table ``numbers``. Added rows survive ``kill -9`` of the writer. A store of an earlier version is converted when
-it is opened for writing, and in memory when it is read.
+A row is a line of the table ``rows``: its fields, and its other numbers as little-endian doubles, whose order is in the
+table ``numbers``. Added rows survive ``kill -9`` of the writer. A store of an earlier version is converted when it is
+opened for writing; when it is only read, the conversion is in memory.
 """
 
 import json
@@ -31,13 +31,13 @@ from tmsopt.studies.study import Study, definition
 from tmsopt.versions import installed_versions, ipopt_version
 
 APPLICATION = 0x746D736F
-"""Application id of SQLite in the header of every store: "tmso"."""
+"""Application id in the SQLite header of every store: "tmso"."""
 
 SCHEMA = 3
-"""Schema of new stores; `old_stores` reads 1 and 2."""
+"""Schema of new stores; `old_stores` reads the schemas 1 and 2."""
 
 LARGEST = 2**27
-"""Most bytes of one value: more than a column of the largest study."""
+"""Largest number of bytes of one value; a column of the largest study has fewer."""
 
 _INTEGER = "INTEGER NOT NULL DEFAULT 0"
 _SQL = {int: _INTEGER, bool: _INTEGER, float: "REAL DEFAULT 0", str: "TEXT NOT NULL DEFAULT ''"}
@@ -54,18 +54,18 @@ CREATE TABLE rows ({", ".join(f"{name} {_SQL[kind]}" for name, kind in SAVED.ite
 """
 _SESSION = "started, ended, pid, host, versions, rows"
 _ROW = ", ".join((*SAVED, "numbers"))
-_STUDY = ("study", "columns")  # tables of what the rows are of
-_ONE_FILE = "PRAGMA journal_mode=DELETE"  # a single file, unless another process reads it
-_ABSENT = b"\xff"  # eight of them are a nan
-_COMPANIONS = ("-journal", "-wal", "-shm")
-_PATIENCE = 60.0  # s to wait for a lock of another process
-_MOST = 20  # most differences listed
+_STUDY = ("study", "columns")  # tables that describe the study
+_ONE_FILE = "PRAGMA journal_mode=DELETE"  # makes the store a single file, unless another process reads it
+_ABSENT = b"\xff"  # eight of these bytes are a nan
+_COMPANIONS = ("-journal", "-wal", "-shm")  # endings of files that SQLite writes next to the store
+_LOCK_SECONDS = 60.0  # longest time to wait for a lock of another process
+_MAX_DIFFERENCES = 20  # largest number of differences that are listed
 _PACKAGES = ("tmsopt", "casadi", "numpy", "scipy", "python-flint")  # packages that affect the numbers of a row
 
 _DAMAGED = "is damaged; --fresh moves it aside and starts a new store, or give another --store"
 _FULL = "reading or writing fails, or the disk is full; make room and run the same command again, the rows are safe"
 _PLACE = "cannot be opened or written here; give a file in a writable folder"
-_BUSY = f"another program kept it locked for {_PATIENCE:g} s; end that and run the same command again"
+_BUSY = f"another program kept it locked for {_LOCK_SECONDS:g} s; end that and run the same command again"
 _MEANINGS = {
     sqlite3.SQLITE_FULL: _FULL,
     sqlite3.SQLITE_IOERR: _FULL,
@@ -80,7 +80,7 @@ _MEANINGS = {
 
 
 def store_error(path: Path, *lines: str) -> InputError:
-    """The error with these lines about a store."""
+    """An error about a store, with these lines as its message."""
     return InputError([Fault(lines[0], file=str(path)), *(Fault(f"  {line}") for line in lines[1:])])
 
 
@@ -110,7 +110,7 @@ class Store:
 
     Attributes:
         path: path of the file.
-        warnings: one line each: changed versions of libraries, and where ``fresh`` moved the previous store.
+        warnings: lines about changed versions of libraries, and about the place to which ``fresh`` moved the old store.
     """
 
     path: Path
@@ -119,17 +119,17 @@ class Store:
     warnings: tuple[str, ...] = ()
 
     def add(self, batch: Batch) -> None:
-        """Add rows durably: they survive ``kill -9`` after the call. An existing row stays unchanged.
+        """Add rows; they survive ``kill -9`` after the call. An existing row stays unchanged.
 
         Raises:
             InputError: on a full disk.
         """
         with self._transaction() as connection:
-            heads = dict.fromkeys(_headers(connection))
-            new = [h for h, x in batch.items() if h not in SAVED and h not in heads and not np.isnan(x).all()]
-            connection.executemany("INSERT INTO numbers VALUES (?)", [(head,) for head in new])
-            absent = np.full(len(batch["number"]), np.nan)
-            table = np.column_stack([batch.get(head, absent) for head in (*heads, *new)] or [absent])
+            heads = dict.fromkeys(_read_headers(connection))
+            new_heads = [h for h, x in batch.items() if h not in SAVED and h not in heads and not np.isnan(x).all()]
+            connection.executemany("INSERT INTO numbers VALUES (?)", [(head,) for head in new_heads])
+            blanks = np.full(len(batch["number"]), np.nan)
+            table = np.column_stack([batch.get(head, blanks) for head in (*heads, *new_heads)] or [blanks])
             table[np.isnan(table)] = np.frombuffer(8 * _ABSENT)[0]
             doubles, size = table.astype("<f8").tobytes(), 8 * table.shape[1]
             blobs = [doubles[k : k + size].rstrip(_ABSENT) for k in range(0, len(doubles), size)]
@@ -140,21 +140,21 @@ class Store:
 
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Connection]:
-        """A transaction, rolled back on any error."""
+        """A transaction, which any error rolls back."""
         with translate_errors(self.path), self._connection as connection:
             connection.execute("BEGIN IMMEDIATE")
             yield connection
 
     def read_batches(self) -> list[Batch]:
-        """All rows as columns, for a `RowTable`.
+        """Read all rows as columns, for a `RowTable`.
 
         Raises:
             InputError: for a damaged store.
         """
         batches = list[Batch]()
         query = f"SELECT {_ROW} FROM rows ORDER BY number"
-        with translate_errors(self.path), closing(self._connection.execute(query)) as found:
-            while lines := found.fetchmany(BLOCK):
+        with translate_errors(self.path), closing(self._connection.execute(query)) as cursor:
+            while lines := cursor.fetchmany(BLOCK):
                 *saved, blobs = zip(*lines, strict=True)
                 batch = {
                     name: column_of([*map(intern, values)] if kind is str else values, kind)  # equal texts share memory
@@ -162,23 +162,23 @@ class Store:
                 }
                 if not set(batch["status"]) <= set(STATUSES):
                     raise ValueError("a row has an unknown status")
-                heads = _headers(self._connection)
+                heads = _read_headers(self._connection)
                 doubles = b"".join(blob.ljust(8 * len(heads), _ABSENT) for blob in blobs)
                 table = np.frombuffer(doubles, "<f8").reshape(len(lines), len(heads)).T
                 batches.append(batch | {head: values.copy() for head, values in zip(heads, table, strict=True)})
         return batches
 
     def about(self) -> dict[str, Any]:
-        """Schema, definition without columns, seed, and when, where and with which versions the store was made."""
+        """Schema, seed and definition of the study without columns; time, machine and versions of its first writer."""
         with translate_errors(self.path):
-            found = _pairs(self._connection, "study")
-            return {"schema": SCHEMA} | found | {n: from_json(found[n]) for n in ("definition", "seed", "versions")}
+            pairs = _read_pairs(self._connection, "study")
+            return {"schema": SCHEMA} | pairs | {n: from_json(pairs[n]) for n in ("definition", "seed", "versions")}
 
     def sessions(self) -> list[dict[str, Any]]:
-        """Every writing process in order: started, ended (None if killed), pid, host, versions, rows added."""
+        """Every process that wrote, in order: started, ended (None if killed), pid, host, versions, added rows."""
         with translate_errors(self.path):
-            found = self._connection.execute(f"SELECT {_SESSION} FROM sessions ORDER BY id").fetchall()
-            sessions = [dict(zip(_SESSION.split(", "), line, strict=True)) for line in found]
+            lines = self._connection.execute(f"SELECT {_SESSION} FROM sessions ORDER BY id").fetchall()
+            sessions = [dict(zip(_SESSION.split(", "), line, strict=True)) for line in lines]
             return [session | {"versions": dict(from_json(session["versions"]))} for session in sessions]
 
     def forget(self, numbers: Iterable[int]) -> None:
@@ -189,16 +189,16 @@ class Store:
 
 @contextmanager
 def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Iterator[Store]:
-    """Open the store of a study for writing, creating it if absent; it is locked until the context ends.
+    """Open the store of a study for writing; create it if it does not exist. It is locked until the context ends.
 
     Args:
-        fresh: move an existing store to ``name.1.sqlite`` or the next free number, and start a new one.
+        fresh: move an existing store to ``name.1.sqlite``, or the next free number, and start a new one.
 
     Raises:
-        InputError: if the store belongs to another study (with the differences), another process writes it, the file is
-            not a store, is damaged or of a newer tmsopt, or the folder is not writable.
+        InputError: if the store belongs to another study (with the differences), if another process writes it, if the
+            file is not a store, is damaged or comes from a newer tmsopt, or if the folder is not writable.
     """
-    path, schema = _inspect(path)
+    path, schema = _inspect_path(path)
     with ExitStack() as stack:
         with translate_errors(path):
             warnings = []
@@ -208,36 +208,36 @@ def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Iterat
                     old.execute(_ONE_FILE)
                 schema = 0
             if not schema:
-                if any(os.path.lexists(f"{path}{ending}") for ending in ("", *_COMPANIONS)):
+                if any(os.path.lexists(f"{path}{suffix}") for suffix in ("", *_COMPANIONS)):
                     warnings.append(f"moved the old store to {files.move_aside(path, _COMPANIONS)}")
                 with _replace_database(path) as new:
-                    _create(new, *_describe_study(study))
-            check_same(path, study)  # before any change
+                    _create_tables(new, *_describe_study(study))
+            check_same(path, study)  # before the store is changed
             if 0 < schema < SCHEMA:
                 with closing(_connect(path, "rw")) as old, _replace_database(path) as new:
                     old.execute(_ONE_FILE)
-                    _copy(old, new)
+                    _copy_store(old, new)
             connection = stack.enter_context(closing(_connect(path, "rw")))
             connection.execute("PRAGMA journal_mode=WAL")
             connection.execute("PRAGMA synchronous=NORMAL")  # safe from kill -9
-            today = _versions()
-            earlier = [then["versions"] for then in Store(path, connection).sessions() if then["rows"]]
-            changed = [line for then in earlier for line in list_differences(then, today, ("in the store", "now"))]
-            line = (_now(), os.getpid(), platform.node(), json.dumps(today))
+            versions = _versions()
+            records = [record["versions"] for record in Store(path, connection).sessions() if record["rows"]]
+            changes = [line for old in records for line in list_differences(old, versions, ("in the store", "now"))]
+            line = (_format_now(), os.getpid(), platform.node(), json.dumps(versions))
             query = "INSERT INTO sessions (started, pid, host, versions) VALUES (?, ?, ?, ?)"
             session = connection.execute(query, line).lastrowid or 0
-            stack.callback(_end, connection, session)
-        yield Store(path, connection, session, tuple(dict.fromkeys(changed + warnings)))
+            stack.callback(_end_session, connection, session)
+        yield Store(path, connection, session, tuple(dict.fromkeys(changes + warnings)))
 
 
 @contextmanager
 def view_store(path: Path | str) -> Iterator[Store]:
-    """Open a store for reading, even while another process writes it.
+    """Open a store for reading; another process may write it at the same time.
 
     Raises:
         InputError: if there is no such file, or it is not a store of tmsopt.
     """
-    path, schema = _inspect(path)
+    path, schema = _inspect_path(path)
     if not schema:
         raise store_error(path, "no such file")
     with ExitStack() as stack:
@@ -246,7 +246,7 @@ def view_store(path: Path | str) -> Iterator[Store]:
             _check_content(connection, path)
             if schema < SCHEMA:
                 old, connection = connection, stack.enter_context(closing(_connect(path, "memory")))
-                _copy(old, connection)
+                _copy_store(old, connection)
         yield Store(path, connection)
 
 
@@ -254,29 +254,30 @@ def check_same(path: Path | str, study: Study) -> None:
     """Check that an existing store belongs to this study.
 
     Raises:
-        InputError: with the differences if it does not; also if the file is not a store, or damaged.
+        InputError: with the differences, if it does not; also if the file is not a store or is damaged.
     """
     with view_store(path) as store, translate_errors(store.path):
         old, new = (
             from_json(about["definition"]) | {"columns": {name: array("d", x) for name, x in columns.items()}}
-            for about, columns in ([_pairs(store._connection, n) for n in _STUDY], _describe_study(study))
+            for about, columns in ([_read_pairs(store._connection, n) for n in _STUDY], _describe_study(study))
         )
-        found = list(list_differences(old, new, ("in the store", "in the file")))
-        if found:
-            more = [f"and {len(found) - _MOST} more"] if len(found) > _MOST else []
+        differences = list(list_differences(old, new, ("in the store", "in the file")))
+        if differences:
+            unlisted = len(differences) - _MAX_DIFFERENCES
+            remainder = [f"and {unlisted} more"] if unlisted > 0 else []
             advice = "add --fresh to move it aside and start a new store, or give another --store"
             message = f"holds the rows of another study; {advice}. Differences:"
-            raise store_error(store.path, message, *found[:_MOST], *more)
+            raise store_error(store.path, message, *differences[:_MAX_DIFFERENCES], *remainder)
 
 
 def _describe_study(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
     """The metadata of a new store, and the columns of the study as little-endian doubles."""
     plain = definition(study, lambda values: np.asarray(values, dtype="<f8").tobytes())
-    kept = plain.pop("columns", {})
+    columns = plain.pop("columns", {})
     about = {
         "definition": json.dumps(plain),
         "seed": json.dumps(plain["seed"]),
-        "created": _now(),
+        "created": _format_now(),
         "host": platform.node(),
         "platform": platform.platform(),
         "versions": json.dumps(_versions()),
@@ -284,19 +285,19 @@ def _describe_study(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
     if len(about["definition"]) > files.LARGEST_JSON:
         message = f"its definition has more than {files.LARGEST_JSON} characters; give the values in a CSV file"
         raise input_error(message, "study")
-    return about, kept
+    return about, columns
 
 
-def _create(connection: sqlite3.Connection, about: Mapping[str, str], kept: Mapping[str, bytes]) -> None:
-    """Create an empty store."""
+def _create_tables(connection: sqlite3.Connection, about: Mapping[str, str], columns: Mapping[str, bytes]) -> None:
+    """Create the tables of an empty store."""
     connection.executescript(_TABLES)
-    for table, pairs in zip(_STUDY, (about, kept), strict=True):
+    for table, pairs in zip(_STUDY, (about, columns), strict=True):
         connection.executemany(f"INSERT INTO {table} VALUES (?, ?)", pairs.items())
 
 
-def _copy(old: sqlite3.Connection, new: sqlite3.Connection) -> None:
+def _copy_store(old: sqlite3.Connection, new: sqlite3.Connection) -> None:
     """Copy a store of an earlier version to an empty database."""
-    _create(new, _pairs(old, "about"), read_columns(old))
+    _create_tables(new, _read_pairs(old, "about"), read_columns(old))
     store = Store(Path("copy"), new)
     with closing(read_batches(old)) as batches:  # an open cursor would keep the file locked
         for batch in batches:
@@ -312,15 +313,15 @@ def _replace_database(path: Path) -> Iterator[sqlite3.Connection]:
         yield connection
 
 
-def _end(connection: sqlite3.Connection, session: int) -> None:
+def _end_session(connection: sqlite3.Connection, session: int) -> None:
     with suppress(sqlite3.Error):  # a full disk has already raised a better error
-        connection.execute("UPDATE sessions SET ended = ? WHERE id = ?", (_now(), session))
+        connection.execute("UPDATE sessions SET ended = ? WHERE id = ?", (_format_now(), session))
         connection.execute(_ONE_FILE)
 
 
 @contextmanager
 def _lock(path: Path) -> Iterator[None]:
-    """The lock of the only writer."""
+    """Lock the store, so that there is only one writer."""
     lock = FileLock(f"{path}.lock", timeout=0)
     try:
         lock.acquire()
@@ -330,24 +331,24 @@ def _lock(path: Path) -> Iterator[None]:
         yield
     finally:
         with suppress(OSError):
-            Path(lock.lock_file).unlink()  # before the release; Windows keeps an open file
+            Path(lock.lock_file).unlink()  # before the release, although Windows does not remove an open file
         lock.release()
 
 
 def _connect(path: Path, mode: str) -> sqlite3.Connection:
-    connection = sqlite3.connect(f"{path.as_uri()}?mode={mode}", uri=True, timeout=_PATIENCE, isolation_level=None)
+    connection = sqlite3.connect(f"{path.as_uri()}?mode={mode}", uri=True, timeout=_LOCK_SECONDS, isolation_level=None)
     connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
     connection.execute("PRAGMA trusted_schema=OFF")
     return connection
 
 
-def _inspect(given: Path | str) -> tuple[Path, int]:
+def _inspect_path(location: Path | str) -> tuple[Path, int]:
     """The path of a store and its schema, 0 if there is none.
 
     Raises:
-        InputError: for a missing folder, another kind of file, or the store of a newer tmsopt.
+        InputError: for a missing folder, a file that is not a store, or a store of a newer tmsopt.
     """
-    path = Path(os.path.realpath(given))  # a link and its store share one lock
+    path = Path(os.path.realpath(location))  # a link and its store share one lock
     if not path.parent.is_dir():
         raise store_error(path, f"the folder {path.parent} does not exist; make it, or give another --store")
     if not os.path.lexists(path):
@@ -367,7 +368,7 @@ def _inspect(given: Path | str) -> tuple[Path, int]:
 
 
 def _check_content(connection: sqlite3.Connection, path: Path) -> None:
-    """Check that a store has only plain tables, which execute nothing, and that its pages are intact."""
+    """Check that a store has only plain tables, which cannot execute code, and that its pages are intact."""
     query = "SELECT type, name FROM sqlite_schema WHERE type NOT IN ('table', 'index') OR sql LIKE '%VIRTUAL%' LIMIT 1"
     for kind, name in connection.execute(query):
         raise store_error(path, f"{_DAMAGED} (a store has no {kind} '{name!s:.60}')")
@@ -377,30 +378,30 @@ def _check_content(connection: sqlite3.Connection, path: Path) -> None:
 
 
 def _describe_writer(path: Path) -> str:
-    """The process that writes a store, and what to do."""
-    who = "another process, which has just started,"
+    """Name the process that writes a store, and say what to do."""
+    writer = "another process, which has just started,"
     with suppress(InputError, IndexError), view_store(path) as store:  # it may be moved aside at this moment
-        last = store.sessions()[-1]
-        if last["ended"] is None:
-            who = f"process {last['pid']} on {last['host']}, since {last['started']},"
-    return f"{who} writes this store; wait for it or end it, or give another --store"
+        session = store.sessions()[-1]
+        if session["ended"] is None:
+            writer = f"process {session['pid']} on {session['host']}, since {session['started']},"
+    return f"{writer} writes this store; wait for it or end it, or give another --store"
 
 
-def _pairs(connection: sqlite3.Connection, table: str) -> dict[str, Any]:
+def _read_pairs(connection: sqlite3.Connection, table: str) -> dict[str, Any]:
     return dict(connection.execute(f"SELECT * FROM {table} ORDER BY rowid").fetchall())
 
 
-def _headers(connection: sqlite3.Connection) -> list[str]:
-    """Headers of the numbers of a row, in order."""
+def _read_headers(connection: sqlite3.Connection) -> list[str]:
+    """Headers of the numbers of a row, in their order."""
     return [header for (header,) in connection.execute("SELECT header FROM numbers ORDER BY rowid")]
 
 
-def _now() -> str:
-    """The time in UTC, ISO 8601."""
+def _format_now() -> str:
+    """The current time in UTC, in the format ISO 8601."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 def _versions() -> dict[str, str]:
-    """Versions of tmsopt, Python, the numerical libraries, and IPOPT if its file shows it; imports nothing."""
-    found = {"python": platform.python_version(), **installed_versions(_PACKAGES), "ipopt": ipopt_version()}
-    return {name: version or "unknown" for name, version in found.items()}
+    """Versions of tmsopt, Python, the numerical libraries, and IPOPT if its file shows it. Nothing is imported."""
+    versions = {"python": platform.python_version(), **installed_versions(_PACKAGES), "ipopt": ipopt_version()}
+    return {name: version or "unknown" for name, version in versions.items()}

@@ -30,7 +30,7 @@ from tmsopt.program.options import STARTS
 from tmsopt.records import Array, Column, Table
 from tmsopt.studies.sampling import MOST_ROWS, column_of_numbers, grid
 
-_SEEDS = 2**31
+_SEED_COUNT = 2**31
 
 
 @dataclass(frozen=True)
@@ -38,18 +38,18 @@ class Study:
     """A problem and values that vary from row to row; see `load_study` for its file form.
 
     Attributes:
-        problem: the problem of every row; varied names have a value here too.
+        problem: the problem of every row; the varied names have a value here too, which the columns replace.
         columns: name → its value in every row (rad, SI units); all have the same length. A name is a fixed parameter,
             ``lambda_s.min`` or ``lambda_s.max`` of a free one, or ``trail.limit``, the number in the constraint
             ``trail``.
         title: one line for reports.
         seed: seed from which the seeds of the rows follow.
-        starts: most starts of a row.
+        starts: largest number of starts of a row.
         warm: whether each row starts at the optimum of its neighbour.
-        report: expressions recorded for every row, besides parameters and abscissa.
-        grid_shape: axis → number of values for a full grid, in the order of the columns, the last one fastest; None for
-            other studies.
-        method: how the columns were made (grid, list, latin_hypercube, sobol, csv, monte_carlo); has no effect on rows.
+        report: expressions recorded for every row, in addition to parameters and abscissa.
+        grid_shape: for a full grid, axis → number of values, in the order of the columns; the last axis changes
+            fastest. None for other studies.
+        method: how the columns were made (grid, list, latin_hypercube, sobol, csv, monte_carlo); does not affect rows.
         notes: sentences for the reader.
 
     Raises:
@@ -75,8 +75,8 @@ class Study:
     notes: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        if found := list(faults(self)):
-            raise InputError(found)
+        if messages := list(faults(self)):
+            raise InputError(messages)
         vars(self).update(
             columns=Table({name: Column(values) for name, values in self.columns.items()}),
             report=tuple(dict.fromkeys(text.strip() for text in self.report)),
@@ -89,12 +89,12 @@ class Study:
 
     @property
     def axes(self) -> dict[str, Array]:
-        """Axis → its values in order, for a full grid."""
-        found, stride = {}, len(self)
+        """Axis of a full grid → its values in order; empty for other studies."""
+        axes, stride = {}, len(self)
         for name, size in (self.grid_shape or {}).items():
             stride //= size
-            found[name] = np.asarray(self.columns[name])[: size * stride : stride]
-        return found
+            axes[name] = np.asarray(self.columns[name])[: size * stride : stride]
+        return axes
 
     def varied(self, row: int) -> Table[float]:
         """The varied values of a row, counted from 0.
@@ -108,7 +108,7 @@ class Study:
         return Table({name: column[row] for name, column in self.columns.items()})
 
     def row_problem(self, row: int) -> Problem:
-        """The problem of a row; a start outside the bounds of the row is moved to the nearer bound.
+        """The problem of a row; a start value outside the bounds of the row is moved to the nearer bound.
 
         Raises:
             InputError: for an invalid problem, such as one with lambda_s.min above lambda_s.max.
@@ -128,9 +128,9 @@ class Study:
         return replace(problem, fixed=fixed, free=free, constraints=constraints, start=start)
 
     def seed_of(self, row: int) -> int:
-        """The seed of a row's starts; it depends on the row only, so the row can be solved alone."""
+        """The seed of a row's starts; it depends on this row only, so that a row can be solved alone."""
         state = np.random.SeedSequence(self.seed, spawn_key=(row,)).generate_state(1)
-        return int(state[0]) % _SEEDS
+        return int(state[0]) % _SEED_COUNT
 
 
 def over_grid(
@@ -143,7 +143,7 @@ def over_grid(
     warm: bool = False,
     report: Sequence[str] = (),
 ) -> Study:
-    """The study of every combination of the axes' values, the last axis fastest.
+    """The study of every combination of the axes' values; the last axis changes fastest.
 
     Raises:
         InputError: listing all faults.
@@ -155,8 +155,8 @@ def over_grid(
 
     More: docs/reference/study_file.md
     """
-    if wrong := table_faults("axes", axes, "{'mu': [0.1, 0.2]}"):
-        raise InputError(wrong)
+    if axis_faults := table_faults("axes", axes, "{'mu': [0.1, 0.2]}"):
+        raise InputError(axis_faults)
     return Study(
         problem=pose(problem).problem,
         columns=grid(axes),
@@ -171,20 +171,20 @@ def over_grid(
 
 
 def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) -> dict[str, Any]:
-    """Everything that determines the rows of a study, for ``json.dumps``, without title and notes.
+    """Everything that determines the rows of a study, for ``json.dumps``.
 
-    Two studies with equal definitions, solved by the same versions, have equal rows. A grid is given by its axes. The
-    order of names in ``order`` matters too, because starts depend on the order of the free parameters.
+    Two studies with equal definitions, solved by the same versions, have equal rows. A grid is stored as its axes. The
+    definition includes the order of names, because starts depend on the order of the free parameters.
 
     Args:
-        column: conversion of a column that is not an axis of a grid; lists take four times the memory.
+        column: converts a column of a study that is not a grid; a list takes four times the memory of an array.
     """
     if study.grid_shape is None:
         columns: dict[str, Any] = {"columns": {name: column(values) for name, values in study.columns.items()}}
     else:
         columns = {"grid": {name: values.tolist() for name, values in study.axes.items()}, "axes": list(study.axes)}
     return {
-        "problem": _problem(study.problem),
+        "problem": _describe_problem(study.problem),
         **columns,
         "seed": int(study.seed),
         "starts": int(study.starts),
@@ -193,7 +193,7 @@ def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) ->
     }
 
 
-def _problem(problem: Problem) -> dict[str, Any]:
+def _describe_problem(problem: Problem) -> dict[str, Any]:
     names = ("fixed", "constraints", "tolerances", "weights", "start")
     tables: dict[str, dict[str, Any]] = {name: dict(getattr(problem, name)) for name in names}
     tables["free"] = {name: list(ends) for name, ends in problem.free.items()}
@@ -215,17 +215,17 @@ def _problem(problem: Problem) -> dict[str, Any]:
 
 
 MOST_REPORTED = 1000
-"""Most expressions recorded for every row."""
+"""Largest number of expressions recorded for every row."""
 
 METHODS = ("grid", "list", "latin_hypercube", "sobol", "csv", "monte_carlo")
 """Methods of making the rows of a study."""
 
-Stated = Any
+UncheckedStudy = Any
 """A Study before validation: any field may be of any type."""
 
 
-def faults(study: Stated) -> Iterator[Fault]:
-    """All faults of a study."""
+def faults(study: UncheckedStudy) -> Iterator[Fault]:
+    """All faults of a study before validation."""
     if not isinstance(study.problem, Problem):
         message = f"found {short(study.problem)}; accepted: a Problem, such as tmsopt.load('problems/least_speed.toml')"
         yield Fault(message, ("problem",))
@@ -248,7 +248,7 @@ def variable_names(problem: Posed) -> tuple[str, ...]:
 
 
 def name_faults(problem: Posed) -> Callable[[Any], str]:
-    """A function that says why a name cannot vary; empty if it can."""
+    """A function that says why a name cannot vary; its text is empty for a name that can."""
     accepted, advice = variable_names(problem), limit_advice(suggest)
 
     def find_fault(name: Any) -> str:
@@ -269,28 +269,28 @@ def name_faults(problem: Posed) -> Callable[[Any], str]:
     return find_fault
 
 
-def _column_faults(study: Stated) -> Iterator[Fault]:
+def _column_faults(study: UncheckedStudy) -> Iterator[Fault]:
     if not study.columns:
         accepted = " ".join(variable_names(study.problem.posed))
         yield Fault(f"nothing varies; give at least one column; accepted: {accepted}", ("columns",))
         return
     lengths: dict[str, int] = {}
-    wrong_with = name_faults(study.problem.posed)
+    find_fault = name_faults(study.problem.posed)
     for name, values in study.columns.items():
         key, column = ("columns", str(name)), column_of_numbers(values)
-        if wrong := wrong_with(name):
+        if wrong := find_fault(name):
             yield Fault(wrong, key)
         if column is None:
             yield Fault(f"found {short(values)}; accepted: a list of numbers, such as [0.1, 0.2]", key)
             continue
         lengths[name] = len(column)
-        if bad := np.flatnonzero(~np.isfinite(column)).tolist():
-            more = f" and {len(bad) - 1} more rows" if len(bad) > 1 else ""
-            yield Fault(f"found {column[bad[0]]} in row {bad[0]}{more}; accepted: finite numbers", key)
+        if bad_rows := np.flatnonzero(~np.isfinite(column)).tolist():
+            suffix = f" and {len(bad_rows) - 1} more rows" if len(bad_rows) > 1 else ""
+            yield Fault(f"found {column[bad_rows[0]]} in row {bad_rows[0]}{suffix}; accepted: finite numbers", key)
     rows = next(iter(lengths.values()), 1)
     if set(lengths.values()) - {rows}:
-        found = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        yield Fault(f"columns of different lengths: {found}; give every column one value per row", ("columns",))
+        text = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        yield Fault(f"columns of different lengths: {text}; give every column one value per row", ("columns",))
     elif not 1 <= rows <= MOST_ROWS:
         yield Fault(f"found {rows} rows; accepted: 1 to {MOST_ROWS}", ("columns",))
     elif study.grid_shape is not None and len(lengths) == len(study.columns) and not _fills_grid(study):
@@ -299,7 +299,7 @@ def _column_faults(study: Stated) -> Iterator[Fault]:
         yield Fault(message, ("grid_shape",))
 
 
-def _fills_grid(study: Stated) -> bool:
+def _fills_grid(study: UncheckedStudy) -> bool:
     """Whether the columns agree with the shape of the grid."""
     shape = study.grid_shape
     if not isinstance(shape, Mapping) or list(shape) != list(study.columns):
@@ -309,7 +309,7 @@ def _fills_grid(study: Stated) -> bool:
     return all(np.array_equal(column, study.columns[name]) for name, column in grid(study.axes).items())
 
 
-def _option_faults(study: Stated) -> Iterator[Fault]:
+def _option_faults(study: UncheckedStudy) -> Iterator[Fault]:
     if not isinstance(study.method, str) or study.method not in METHODS:
         yield Fault(f"found {short(study.method)}; {suggest(study.method, METHODS)}", ("method",))
     if not isinstance(study.warm, bool):
@@ -324,8 +324,8 @@ def common_faults(problem: Posed, seed: Any, starts: Any, report: Any) -> Iterat
     """Faults of the seed, the starts and the report of a study."""
     yield from count_faults("seed", seed, 0)
     yield from count_faults("starts", starts, 1, MOST_STARTS)
-    if wrong := list_faults("report", report, "['nu_H', '2*Fr_c']"):
-        yield from wrong
+    if report_faults := list_faults("report", report, "['nu_H', '2*Fr_c']"):
+        yield from report_faults
         return
     if len(report) > MOST_REPORTED:
         yield Fault(f"found {len(report)} expressions; accepted: up to {MOST_REPORTED}", ("report",))

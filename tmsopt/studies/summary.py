@@ -18,14 +18,14 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 @dataclass(frozen=True)
 class Share:
-    """A count out of a total, with Wilson's 95 % interval for the share in the population."""
+    """A count out of a total (`of`), with Wilson's 95 % interval for the share in the population."""
 
     count: int
     of: int
 
     @property
     def share(self) -> float:
-        """From 0 to 1; nan for an empty total."""
+        """The share, from 0 to 1; nan if the total is 0."""
         return self.count / self.of if self.of else math.nan
 
     @property
@@ -35,8 +35,8 @@ class Share:
 
         if not self.of:
             return 0.0, 1.0
-        found = binomtest(self.count, self.of).proportion_ci(method="wilson")
-        return float(found.low), float(found.high)
+        limits = binomtest(self.count, self.of).proportion_ci(method="wilson")
+        return float(limits.low), float(limits.high)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
@@ -45,12 +45,12 @@ class Share:
 
 @dataclass(frozen=True)
 class Yield:
-    """Shares of the drawn rows; failed rows do not count.
+    """Shares of the rows of a Monte Carlo study; failed rows do not count.
 
     Attributes:
-        stable: rows with all roots left of the axis, in the worst scenario.
+        stable: rows with all roots left of the imaginary axis, in the worst scenario.
         feasible: rows that satisfy every constraint.
-        good: rows with both.
+        good: rows that are stable and feasible.
         failed: number of rows without a result.
         abscissa: quantile, such as ``0.95`` → abscissa in the worst scenario; inf for a root at infinity.
     """
@@ -62,7 +62,7 @@ class Yield:
     abscissa: Table[float]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        """Plain data for ``json.dumps``; nan is None."""
         return plain(self)
 
 
@@ -77,8 +77,9 @@ class Summary:
     Attributes:
         rows: number of rows in the study.
         counts: status → number of rows.
-        best: the optimal row with the best objective; None without one.
-        causes: cause of rows that are not optimal → number of rows, ignoring numbers in it, the most frequent first.
+        best: the optimal row with the best objective; None if there is none.
+        causes: cause of rows that are not optimal → number of rows, the most frequent first; causes that differ only in
+            their numbers are one.
         spread: ``objective``, ``abscissa`` → minimum, median and maximum over the optimal rows.
         stable: number of rows with a stable design.
         structures: structure → number of optimal rows, the most frequent first.
@@ -87,7 +88,7 @@ class Summary:
         laws: law → largest relative residual over the rows in which it applies.
         seconds: total time of all rows.
         product: the yield of a Monte Carlo study, else None.
-        clocked: the spread, and the ``quantiles`` of `product`, converted from √(g/w) to 1/s where that is possible.
+        clocked: the spread, and the ``quantiles`` of `product`, converted from √(g/w) to 1/s if that is possible.
     """
 
     rows: int
@@ -123,17 +124,18 @@ def summarise(rows: RowTable) -> Summary:
     objective = study.problem.posed.sign * clocked.get("objective", values["objective"])
     ranked = np.where(optimal & np.isfinite(objective), objective, np.inf)
     spread, in_seconds = (
-        {name: ends for name, x in some.items() if (ends := _ends(x[optimal]))} for some in (values, clocked)
+        {name: ends for name, x in columns.items() if (ends := _compute_spread(x[optimal]))}
+        for columns in (values, clocked)
     )
     product = compute_yield(rows) if study.method == "monte_carlo" else None
     if product and "abscissa" in clocked:
-        in_seconds["quantiles"] = _quantiles(clocked["abscissa"][optimal | (status == "infeasible")])
+        in_seconds["quantiles"] = _compute_quantiles(clocked["abscissa"][optimal | (status == "infeasible")])
     laws = {key: rows.column(head).compressed() for head, (name, key) in rows.headers.items() if name == "laws"}
     return Summary(
         rows=len(study),
         counts=Table({status: counts[status] for status in STATUSES if counts[status]}),
         best=rows[int(np.argmin(ranked))] if np.isfinite(ranked).any() else None,
-        causes=_causes(rows),
+        causes=_count_causes(rows),
         spread=Table(spread),
         stable=int(rows.column("stable").sum() or 0),
         structures=Table(dict(Counter(rows.values("structure")[optimal].tolist()).most_common())),
@@ -147,7 +149,7 @@ def summarise(rows: RowTable) -> Summary:
 
 
 def _to_seconds(rows: RowTable, values: Mapping[str, Array]) -> dict[str, Array]:
-    """Objective and abscissa of every row converted from √(g/w) to 1/s, where possible; w may vary between rows."""
+    """Objective and abscissa of every row, converted from √(g/w) to 1/s if possible; w may vary between rows."""
     problem = rows.study.problem.posed
     parameters = {name: rows.values(header("parameters", name)) for name in problem.parameter_set.names}
     texts = {"objective": problem.goal, "abscissa": "abscissa"}
@@ -155,17 +157,17 @@ def _to_seconds(rows: RowTable, values: Mapping[str, Array]) -> dict[str, Array]
     return {name: values[name] * rate for name, rate in rates.items() if rate is not None}
 
 
-def _causes(rows: RowTable) -> Table[int]:
-    alike: dict[str, list[str]] = {}
+def _count_causes(rows: RowTable) -> Table[int]:
+    groups: dict[str, list[str]] = {}
     for text in rows.values("cause")[rows.values("status") != "optimal"].tolist():
-        alike.setdefault(_NUMBER.sub("#", text), []).append(text)
-    ranked = sorted(alike.values(), key=len, reverse=True)
-    return Table({texts[0] if len(texts) == 1 else _AMOUNT.sub("", texts[0]): len(texts) for texts in ranked})
+        groups.setdefault(_NUMBER.sub("#", text), []).append(text)
+    sorted_groups = sorted(groups.values(), key=len, reverse=True)
+    return Table({texts[0] if len(texts) == 1 else _AMOUNT.sub("", texts[0]): len(texts) for texts in sorted_groups})
 
 
-def _ends(values: Array) -> tuple[float, ...]:
-    known = values[np.isfinite(values)]
-    return tuple(float(of(known)) for of in (np.min, np.median, np.max)) if known.size else ()
+def _compute_spread(values: Array) -> tuple[float, ...]:
+    numbers = values[np.isfinite(values)]
+    return tuple(float(statistic(numbers)) for statistic in (np.min, np.median, np.max)) if numbers.size else ()
 
 
 def compute_yield(rows: RowTable) -> Yield:
@@ -173,12 +175,12 @@ def compute_yield(rows: RowTable) -> Yield:
     status, stable = rows.values("status"), rows.column("stable").filled(False)
     feasible = status == "optimal"
     answered = feasible | (status == "infeasible")
-    most = int(answered.sum())
-    at = zip((f"{q:g}" for q in QUANTILES), _quantiles(rows.values("abscissa")[answered]), strict=False)
-    shares = [Share(int((of & answered).sum()), most) for of in (stable, feasible, stable & feasible)]
-    return Yield(shares[0], shares[1], shares[2], len(status) - most, Table(dict(at)))
+    total = int(answered.sum())
+    quantiles = zip((f"{q:g}" for q in QUANTILES), _compute_quantiles(rows.values("abscissa")[answered]), strict=False)
+    shares = [Share(int((condition & answered).sum()), total) for condition in (stable, feasible, stable & feasible)]
+    return Yield(shares[0], shares[1], shares[2], len(status) - total, Table(dict(quantiles)))
 
 
-def _quantiles(abscissa: Array) -> tuple[float, ...]:
-    known = np.sort(np.where(np.isnan(abscissa), np.inf, abscissa)).tolist()
-    return tuple(known[math.ceil(q * len(known)) - 1] for q in QUANTILES if known)
+def _compute_quantiles(abscissa: Array) -> tuple[float, ...]:
+    ascending = np.sort(np.where(np.isnan(abscissa), np.inf, abscissa)).tolist()
+    return tuple(ascending[math.ceil(q * len(ascending)) - 1] for q in QUANTILES if ascending)

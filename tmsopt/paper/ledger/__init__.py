@@ -1,7 +1,7 @@
-"""A ledger of every number and every verifiable statement of the source paper, recomputed by independent routes.
+"""A ledger of every number and every verifiable statement of the source paper; each is recomputed independently.
 
-In: the paper's claims in `claims.toml`. Out: a `Ledger` with a verdict on each. Open `claims` first: it explains how to
-add a claim.
+In: the paper's claims in `claims.toml`. Out: a `Ledger` with a verdict on each claim. Read `claims` first: it explains
+how to add a claim.
 """
 
 import lazy_loader

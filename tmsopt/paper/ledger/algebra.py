@@ -1,8 +1,8 @@
-"""The words of `claims.toml`, besides its definitions: every function here, and the others of `VOCABULARY`.
+"""The functions that `claims.toml` can use: every function of this module, and the others in `VOCABULARY`.
 
-Exact rational functions, certified roots, Newton's method in balls, and random rational bicycles. A polynomial in s is
-a list of coefficients in descending powers: fractions, rational functions, or balls that contain the true value. A
-comparison of balls is true only if it is certain.
+They compute with exact rational functions, certified roots, Newton's method, and random rational bicycles. A *ball* is
+an interval, a midpoint with a radius, that contains the true value; a comparison of balls is true only if it is
+certain. A polynomial in s is a list of coefficients in descending powers: fractions, rational functions or balls.
 """
 
 import random
@@ -25,19 +25,19 @@ from tmsopt.roots.polynomial import determinant, evaluate, product, quadratic_pe
 from tmsopt.roots.stability import lienard_chipart
 
 PRECISION = 80
-"""Decimal digits carried by balls."""
+"""Decimal digits with which balls are computed."""
 
 Coefficients: TypeAlias = Sequence[Any]
 
-_SOLVED = PRECISION - 15  # decimal digits of Newton's method
-_RADIUS = 50  # decimal digits of the box in which a solution is proved
-_COUNT = 4000  # random bicycles
-_LAWS: Any = laws  # typed loosely, because the laws accept exact numbers too
+_NEWTON_DIGITS = PRECISION - 15  # decimal digits to which Newton's method converges
+_BOX_DIGITS = 50  # decimal digits of the box in which a solution is proved
+_SAMPLE_SIZE = 4000  # number of random bicycles
+_LAWS: Any = laws  # the type is Any, because the laws accept exact numbers too
 
 
 @cache
 def make_ring(names: str) -> dict[str, Quotient]:
-    """The variables of a ring of rational functions by their names."""
+    """A ring of rational functions: name → variable."""
     variables = flint.fmpq_mpoly_ctx.get(names.split(), "lex").gens()
     return dict(zip(names.split(), map(Quotient, variables), strict=True))
 
@@ -46,37 +46,37 @@ def make_ring(names: str) -> dict[str, Quotient]:
 
 
 def differentiate(x: Quotient, variable: Quotient) -> Quotient:
-    """Derivative with respect to a variable."""
-    over, under = (part.derivative(str(variable.numerator)) for part in (x.numerator, x.denominator))
-    return Quotient(over * x.denominator - x.numerator * under, x.denominator**2)
+    """Derivative of a rational function with respect to a variable."""
+    numerator, denominator = (part.derivative(str(variable.numerator)) for part in (x.numerator, x.denominator))
+    return Quotient(numerator * x.denominator - x.numerator * denominator, x.denominator**2)
 
 
 def evaluate_at(x: Quotient, values: Mapping[str, Any]) -> Any:
-    """A quotient at balls, fractions or quotients for all of its variables."""
+    """The value of a quotient for given values of all its variables: balls, fractions or quotients."""
     return _evaluate(x.numerator, values) / _evaluate(x.denominator, values)
 
 
 def substitute(x: Quotient, /, **values: Any) -> Any:
-    """A quotient with values for some of its variables; a fraction if no variable is left."""
-    found = evaluate_at(x, make_ring(" ".join(x.numerator.context().names())) | values)
-    constant = isinstance(found, Quotient) and found.numerator.is_constant() and found.denominator.is_constant()
-    return sum(found.numerator.coeffs()) / found.denominator.leading_coefficient() if constant else found
+    """Substitute values for some variables of a quotient; the result is a fraction if no variable remains."""
+    result = evaluate_at(x, make_ring(" ".join(x.numerator.context().names())) | values)
+    is_constant = isinstance(result, Quotient) and result.numerator.is_constant() and result.denominator.is_constant()
+    return sum(result.numerator.coeffs()) / result.denominator.leading_coefficient() if is_constant else result
 
 
 def is_positive(x: Quotient) -> bool:
-    """Whether all coefficients of numerator and denominator have one sign, so x > 0 for positive variables."""
+    """Whether all coefficients of numerator and denominator have one sign, so that x > 0 for positive variables."""
     coefficients = [*x.numerator.coeffs(), *x.denominator.coeffs()]
     return x != 0 and any(all(sign * c > 0 for c in coefficients) for sign in (1, -1))
 
 
 def vanishes_modulo(x: Quotient, modulus: Quotient) -> bool:
-    """Whether a quotient vanishes with a polynomial: its numerator is a multiple of it, its denominator is not."""
-    over, under = (divmod(part, modulus.numerator)[1] for part in (x.numerator, x.denominator))
-    return bool(over == 0 and under != 0)
+    """Whether a polynomial divides the numerator of a quotient, but not its denominator."""
+    numerator, denominator = (divmod(part, modulus.numerator)[1] for part in (x.numerator, x.denominator))
+    return bool(numerator == 0 and denominator != 0)
 
 
 def list_coefficients(x: Quotient, variable: Quotient) -> Coefficients:
-    """Coefficients of a numerator in a single variable, descending."""
+    """Coefficients of a numerator with a single variable, in descending powers."""
     terms = {powers[_index_of(x, variable)]: c for powers, c in x.numerator.to_dict().items()}
     return [terms.get(k, flint.fmpq(0)) for k in range(max(terms), -1, -1)]
 
@@ -91,12 +91,12 @@ def _index_of(x: Quotient, variable: Quotient) -> int:
 
 
 def factorise(x: Quotient) -> list[Quotient]:
-    """The irreducible factors of the numerator, once each."""
+    """The different irreducible factors of the numerator."""
     return [Quotient(factor) for factor, _ in x.numerator.factor()[1]]
 
 
 def resultant(x: Quotient, y: Quotient, variable: Quotient) -> Quotient:
-    """Resultant of two numerators: it vanishes where both vanish for the same value of the variable."""
+    """Resultant of two numerators; it vanishes where both have a common zero in the variable."""
     return Quotient(x.numerator.resultant(y.numerator, str(variable.numerator)))
 
 
@@ -113,34 +113,36 @@ def _evaluate(polynomial: Any, values: Mapping[str, Any]) -> Any:
 
 
 def is_stable(p: Coefficients) -> bool:
-    """Whether every root certainly lies in Re s < 0, by Liénard–Chipart on fractions or balls."""
+    """Whether every root certainly has Re s < 0, by the Liénard–Chipart conditions for fractions or balls."""
     if not (p[0] > 0 or p[0] < 0):
         return False
     return all(bool(quantity > 0) for quantity in lienard_chipart([c if p[0] > 0 else -c for c in p]))
 
 
 def ball_roots(p: Coefficients) -> list[Any]:
-    """Isolating balls of the simple roots of a polynomial with balls for coefficients."""
+    """Isolating balls of the simple roots of a polynomial whose coefficients are balls."""
     polynomial: Any = flint.acb_poly([flint.acb(c) for c in reversed(p)])
     return list(polynomial.roots())
 
 
 def match_factors(
-    p: Coefficients, parts: Sequence[Coefficients], guess: Mapping[str, float], known: Mapping[str, Any]
+    p: Coefficients, factors: Sequence[Coefficients], guess: Mapping[str, float], known_values: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """The proved unknowns near a guess for which a polynomial is its leading coefficient times monic factors, in balls.
+    """Solve for unknowns near a guess, so that a polynomial is its leading coefficient times monic factors.
+
+    The result is unknown → ball; exactly one solution is proved to lie in these balls.
 
     Raises:
         ArithmeticError: if no unique solution is proved.
     """
     names = list(guess)
-    sides = [(a - p[0] * m).numerator for a, m in zip(p[1:], product(*parts)[1:], strict=True)]
+    sides = [(a - p[0] * m).numerator for a, m in zip(p[1:], product(*factors)[1:], strict=True)]
 
     def system(unknowns: Mapping[str, Any]) -> list[Any]:
-        return [_evaluate(side, {**known, **unknowns}) for side in sides]
+        return [_evaluate(side, {**known_values, **unknowns}) for side in sides]
 
-    middle = refine_solution(system, {name: flint.arb(value) for name, value in guess.items()}, names, _SOLVED)
-    return dict(enclose_solution(system, middle, names, _RADIUS).balls)
+    middle = refine_solution(system, {name: flint.arb(value) for name, value in guess.items()}, names, _NEWTON_DIGITS)
+    return dict(enclose_solution(system, middle, names, _BOX_DIGITS).balls)
 
 
 # Numbers
@@ -152,24 +154,24 @@ def sqrt(x: Any) -> Any:
 
 
 def round_to_six(x: Any) -> Any:
-    """A ball to six decimals, as a fraction."""
+    """The midpoint of a ball, rounded to six decimals, as a fraction."""
     return rational(f"{float(x.mid()):.6f}")
 
 
-# Random rational bicycles, each with the five printed conditions and its stability by Liénard–Chipart
+# Random rational bicycles, each with the five conditions of the paper, and its stability by Liénard–Chipart
 
 
 @cache
 def draw_sample() -> list[dict[str, Any]]:
-    """Bicycles in every sign regime, Fr of both signs: see `describe_design`."""
+    """Random bicycles in which parameters, and Fr too, have both signs; see `describe_design`."""
     return [describe_design(*design) for design in _draw_designs()]
 
 
 def describe_design(*design: Any) -> dict[str, Any]:
     """Facts about a bicycle, in fractions, from Fr, μ, χ_B, χ_H, ζ_B, ζ_H and tan λ_s.
 
-    `skew` is a1/(Fr ζ_B); `square` is Fr_c² by flus, None if infinite; `lines` are the five conditions lscf, `admitted`
-    is whether all of them hold, and `stable` is whether the bicycle is stable.
+    `skew` is a1/(Fr ζ_B). `square` is Fr_c² by equation flus, None if it is infinite. `lines` are the five conditions
+    of equation lscf, `admitted` says whether all of them hold, and `stable` whether the bicycle is stable.
     """
     Fr, mu, chi_B, chi_H, zeta_B, zeta_H, T = map(rational, design)
     skew = zeta_B * chi_H - zeta_H * chi_B
@@ -189,7 +191,7 @@ def _draw_designs() -> Iterator[tuple[Any, ...]]:
     def one_of(*values: int) -> Any:
         return rational(pick.choice(values))
 
-    for k in range(_COUNT):
+    for k in range(_SAMPLE_SIZE):
         chi_H = 1 + tenths(-1, 1) / 3 if k % 2 else tenths(-2, 3)
         zeta_B, zeta_H = -rational(pick.randint(1, 40)) / 20, -rational(pick.randint(0, 40)) / 20
         mu, T = one_of(1, 2, 5, 10, 50, 200) / 10, one_of(1, 3, 7, 15, 60) / 10

@@ -1,6 +1,6 @@
-"""The claims of `claims.toml`, each with the computation that decides it.
+"""Computes the claims of `claims.toml`.
 
-A claim about a printed decimal is one table in that file, and nothing else:
+A claim about a printed decimal is one table in that file; it needs no other code:
 
     [[section.claim]]
     key = "Fr_EP4"
@@ -11,8 +11,8 @@ A claim about a printed decimal is one table in that file, and nothing else:
     printed = "2.236317517"
     value = "ep4.Fr"
 
-The head of the file explains the other rules and the keys of a table. A computation that the expressions of `language`
-cannot express becomes a function of `algebra`, which is then a word of them.
+The head of the file explains the other rules and the keys of a table. If the expressions of `language` cannot express a
+computation, add a function to `algebra`; expressions can then call it.
 """
 
 from collections.abc import Sequence
@@ -44,10 +44,10 @@ SOURCE = "O. N. Kirillov, Localizing EP sets in dissipative systems and the self
 
 
 def verify(progress: Listener | None = None, only: Sequence[str] = ()) -> Ledger:
-    """Compute the ledger, or the entries whose keys match one of the given patterns.
+    """Compute the ledger, or only the entries whose keys match one of the given patterns.
 
     Args:
-        progress: called with a `tmsopt.Progress` now and then.
+        progress: called from time to time with a `tmsopt.Progress`.
         only: keys, or patterns with * and ?.
 
     Raises:
@@ -64,18 +64,18 @@ def verify(progress: Listener | None = None, only: Sequence[str] = ()) -> Ledger
     for pattern in map(str, only):
         if not select_claims([pattern]):
             raise input_error(f"found '{pattern}'; accepted: a key of the ledger, or a pattern", "--only")
-    chosen, steps = select_claims(only), start_steps(progress, "recomputing claims", "claim")
+    claims, steps = select_claims(only), start_steps(progress, "recomputing claims", "claim")
     entries = []
-    for done, claim in enumerate(chosen, 1):
+    for count, claim in enumerate(claims, 1):
         with flint.ctx.workdps(PRECISION):
             entries.append(compute_entry(claim))
         if steps:
-            steps(done, len(chosen))
+            steps(count, len(claims))
     return Ledger(SOURCE, tuple(entries))
 
 
 def select_claims(only: Sequence[str] = ()) -> tuple[Table, ...]:
-    """The claims whose keys match one of the patterns; all without patterns."""
+    """The claims whose keys match one of the patterns; all claims if there is no pattern."""
     return tuple(c for c in list_claims() if not only or any(fnmatchcase(c["key"], pattern) for pattern in only))
 
 
@@ -86,14 +86,16 @@ def list_claims() -> tuple[Table, ...]:
 
 
 def compute_entry(claim: Table) -> Entry:
-    """Compute a claim.
+    """Compute the entry of a claim.
 
     Raises:
-        ArithmeticError: if an outcome that is not exact has no explanation, or the explanation is not proved.
+        ArithmeticError: if a verdict other than exact has no remark, or the statements under ``noted`` are not proved.
     """
     scope = open_scope(claim, {})
-    shown = {name: _FormattedValue(value) for name, value in scope.items()}
-    printed, remark, otherwise, condition, against = (claim.get(field, "").format_map(shown) for field in _TEXTS)
+    formatted_values = {name: _FormattedValue(value) for name, value in scope.items()}
+    printed, remark, otherwise, condition, against = (
+        claim.get(field, "").format_map(formatted_values) for field in _TEXTS
+    )
     value = compute(claim.get("value", claim.get("computed", "''")), scope)
     computed = format_digits(value) if isinstance(value, flint.arb | flint.fmpq) else f"{_FormattedValue(value)}"
     proved = are_true(claim.get("holds", []), scope)
@@ -107,18 +109,18 @@ def compute_entry(claim: Table) -> Entry:
             outcome = judge_statement(condition, bool(condition) and proved, against, refuted, remark)
     if (outcome.verdict != EXACT and not outcome.remark) or not are_true(claim.get("noted", []), scope):
         raise ArithmeticError(f"{claim['key']}: '{outcome.verdict}' without an explanation that is proved")
-    copied = {field: claim[field] for field in ("key", "section", "place", "statement", "route")}
-    return Entry(**copied, printed=printed, computed=computed, **outcome._asdict())
+    texts = {field: claim[field] for field in ("key", "section", "place", "statement", "route")}
+    return Entry(**texts, printed=printed, computed=computed, **outcome._asdict())
 
 
 @dataclass(frozen=True)
 class _FormattedValue:
-    """A value of an expression within a text."""
+    """The value of an expression that is inserted into a text."""
 
     value: Any
 
     def __format__(self, form: str) -> str:
-        """The text of the value: as it is, to a number of digits, or as Python formats a float."""
+        """The text of the value: unchanged, with a number of digits, or in a format of Python for floats."""
         match self.value:
             case list(parts):
                 return ", ".join(format(_FormattedValue(part), form) for part in parts)

@@ -1,4 +1,4 @@
-"""Entries of the ledger, and the rules that give a verdict on a computed value."""
+"""Entries of the ledger, and the rules for the verdict on a computed value."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -17,13 +17,13 @@ DIGITS_OFF = "last digits off"
 CONDITIONAL = "holds only under a stated condition"
 FAILS = "does not hold"
 VERDICTS = (EXACT, DIGITS_HOLD, DIGITS_OFF, CONDITIONAL, FAILS)
-"""The only verdicts, best first."""
+"""All verdicts, from the best to the worst."""
 
 SHOWN = 40
 """Significant digits of a computed number."""
 
-_OFF_UNITS = 50  # of the last printed digit, so only the last two digits differ
-_OFF_RELATIVE = 1e-6  # largest relative difference
+_MAX_UNITS_OFF = 50  # `DIGITS_OFF` allows this many units of the last printed digit, so only two digits differ
+_MAX_RELATIVE_OFF = 1e-6  # `DIGITS_OFF` allows this relative difference
 
 
 class Judgement(NamedTuple):
@@ -70,7 +70,7 @@ class Ledger(Tabular):
         return {verdict: counted[verdict] for verdict in VERDICTS}
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """The entries, one per row."""
+        """One record for each entry."""
         return map(plain, self.entries)
 
     def to_json(self) -> dict[str, Any]:
@@ -82,54 +82,56 @@ class Ledger(Tabular):
 
 
 def format_digits(value: Any) -> str:
-    """A ball or a fraction to 40 significant digits."""
+    """A ball or a fraction with 40 significant digits."""
     return str(flint.arb(value).str(SHOWN, radius=False))
 
 
 def judge_decimal(printed: str, value: Any, remark: str = "") -> Judgement:
-    """Judge a printed decimal against a ball, or a fraction, that contains the true value.
+    """Judge a printed decimal by its distance from the true value, which is a fraction or lies in a ball.
 
-    The number is exact if both are equal. The printed digits hold within half a unit of the last digit. The last digits
-    are off within 50 units and a relative millionth. Otherwise the number does not hold.
+    The number is exact if it equals a fraction. Its digits hold up to a distance of half a unit of the last digit. The
+    last digits are off up to 50 units, if the relative difference is below 10⁻⁶. Otherwise the number does not hold.
 
     Raises:
         ArithmeticError: if the ball is too wide to decide.
     """
-    claimed, ball = rational(printed), flint.arb(value)
-    if isinstance(value, flint.fmpq) and value == claimed:
+    printed_number, ball = rational(printed), flint.arb(value)
+    if isinstance(value, flint.fmpq) and value == printed_number:
         return Judgement(EXACT, remark)
-    distance = abs(ball - claimed) * 10 ** len(printed.partition(".")[2])
+    distance = abs(ball - printed_number) * 10 ** len(printed.partition(".")[2])
     half = flint.arb(0.5)
     if distance <= half:
         verdict = DIGITS_HOLD
     elif not distance > half:
         raise ArithmeticError(f"{printed} against {ball}: the ball is too wide to round")
     else:
-        close = abs(ball - claimed) < abs(ball) * _OFF_RELATIVE
-        verdict = DIGITS_OFF if distance < _OFF_UNITS and close else FAILS
+        is_close = abs(ball - printed_number) < abs(ball) * _MAX_RELATIVE_OFF
+        verdict = DIGITS_OFF if distance < _MAX_UNITS_OFF and is_close else FAILS
     size = f"{float(distance.mid()):.{2 + (verdict == FAILS)}g}"
     words = f"The true value is {size} units of the last printed digit away."
     return Judgement(verdict, f"{words} {remark}".strip())
 
 
 def judge_identity(holds: bool, remark: str = "", otherwise: str = "") -> Judgement:
-    """Exact if the proof succeeds; otherwise it does not hold, for the given reason."""
+    """Judge an identity: it is exact if the proof succeeds; otherwise it does not hold, for the reason `otherwise`."""
     return Judgement(EXACT, remark) if holds else Judgement(FAILS, otherwise or "The proof does not run through.")
 
 
-def judge_statement(condition: str, under: bool, against: str, counterexample: bool, remark: str = "") -> Judgement:
-    """Judge a general statement: proved under a condition and refuted outside it, or refuted.
+def judge_statement(condition: str, is_proved: bool, against: str, is_refuted: bool, remark: str = "") -> Judgement:
+    """Judge a general statement that a counterexample refutes; it may be proved under a condition.
 
     Args:
         condition: the condition that must be added.
-        under: whether the proof under the condition succeeds.
+        is_proved: whether the proof under the condition succeeds.
         against: the counterexample in words.
-        counterexample: whether it refutes the statement as printed.
+        is_refuted: whether the counterexample refutes the statement as printed.
 
     Raises:
-        ArithmeticError: if it does not.
+        ArithmeticError: if the counterexample does not refute the statement.
     """
-    if not counterexample:
+    if not is_refuted:
         raise ArithmeticError(f"neither proved nor refuted: {condition}")
-    needed = f"Condition: {condition}. " if under else ""
-    return Judgement(CONDITIONAL if under else FAILS, f"{needed}Counterexample: {against}. {remark}".strip())
+    condition_text = f"Condition: {condition}. " if is_proved else ""
+    return Judgement(
+        CONDITIONAL if is_proved else FAILS, f"{condition_text}Counterexample: {against}. {remark}".strip()
+    )

@@ -1,4 +1,4 @@
-"""The expressions of `claims.toml`: a small subset of Python, parsed and evaluated here, never executed by Python.
+"""The expressions of `claims.toml`: a small subset of Python. This module evaluates them; Python never executes them.
 
 An expression has exact numbers (0.1 is 1/10), names, texts, ``+ - * / **``, comparisons, ``and or not``, lists, calls,
 indices, fields such as ``ep4.Fr``, and ``[… for … in … if …]``. A name is looked up as a variable or definition of the
@@ -44,18 +44,18 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
 
 @cache
 def read_tables() -> Table:
-    """The whole of `claims.toml`."""
+    """The content of `claims.toml`."""
     return tomllib.loads(resources.files(__package__).joinpath("claims.toml").read_text(encoding="utf-8"))
 
 
 @cache
 def list_definitions() -> dict[str, tuple[list[str], Table]]:
-    """Parameters and table of each name under ``[define]``; a mere expression is the value of a table."""
-    found = {}
+    """Name under ``[define]`` → its parameters and its table; a text becomes the ``value`` of a table."""
+    definitions = {}
     for head, table in read_tables()["define"].items():
         name, *parameters = re.findall(r"\w+", head)
-        found[name] = parameters, {"value": table} if isinstance(table, str) else table
-    return found
+        definitions[name] = parameters, {"value": table} if isinstance(table, str) else table
+    return definitions
 
 
 def compute(text: str, scope: Scope) -> Any:
@@ -64,7 +64,7 @@ def compute(text: str, scope: Scope) -> Any:
     Raises:
         SyntaxError: for text that is not an expression of this language.
     """
-    return _walk(_parse(text).value, scope)
+    return _evaluate(_parse(text).value, scope)
 
 
 def are_true(texts: Iterable[str], scope: Scope) -> bool:
@@ -73,13 +73,13 @@ def are_true(texts: Iterable[str], scope: Scope) -> bool:
 
 
 def open_scope(table: Table, scope: Scope) -> Scope:
-    """A scope with the variables and definitions of a table, after those of its setting."""
-    both = read_tables()["setting"].get(table.get("setting"), {}), table
-    opened = scope | make_ring(" ".join(part.get("variables", "") for part in both))
-    for line in (line for part in both for line in part.get("where", ())):
+    """A scope that adds the variables and definitions of a table, after those of its setting, to another scope."""
+    tables = read_tables()["setting"].get(table.get("setting"), {}), table
+    new_scope = scope | make_ring(" ".join(part.get("variables", "") for part in tables))
+    for line in (line for part in tables for line in part.get("where", ())):
         assignment = _parse(line)
-        opened |= _bind(assignment.targets[0], _walk(assignment.value, opened))
-    return opened
+        new_scope |= _bind_names(assignment.targets[0], _evaluate(assignment.value, new_scope))
+    return new_scope
 
 
 @cache
@@ -96,50 +96,52 @@ def _look_up(name: str, scope: Scope) -> Any:
 
 
 def _apply(name: str, *operands: Any) -> Any:
-    """The result of a definition: a value, whether it holds, or a solved point."""
+    """The result of a definition: a value, the truth of its statements, or a solved point."""
     parameters, table = list_definitions()[name]
     if "guess" in table:
         return _solve(name, *operands)
-    opened = open_scope(table, dict(zip(parameters, operands, strict=True)))
-    return compute(table["value"], opened) if "value" in table else are_true(table["holds"], opened)
+    new_scope = open_scope(table, dict(zip(parameters, operands, strict=True)))
+    return compute(table["value"], new_scope) if "value" in table else are_true(table["holds"], new_scope)
 
 
 @cache
 def _solve(name: str, *operands: Any) -> dict[str, Any]:
-    """A point: its known values, and the proved unknowns for which its polynomial has the factors."""
+    """Solve for a point: its known values, and the proved unknowns for which its polynomial has the given factors."""
     parameters, table = list_definitions()[name]
     scope = dict(zip(parameters, operands, strict=True))
     with flint.ctx.workdps(PRECISION):  # independent of the caller, because the result is cached
-        known = {unknown: compute(text, scope) for unknown, text in table.get("known", {}).items()}
-        guess = {unknown: float(compute(str(text), scope | known)) for unknown, text in table["guess"].items()}
-        free = make_ring(" ".join([*guess, *known]))
-        return known | match_factors(compute(table["polynomial"], free), compute(table["factors"], free), guess, known)
+        known_values = {unknown: compute(text, scope) for unknown, text in table.get("known", {}).items()}
+        guess = {unknown: float(compute(str(text), scope | known_values)) for unknown, text in table["guess"].items()}
+        free = make_ring(" ".join([*guess, *known_values]))
+        return known_values | match_factors(
+            compute(table["polynomial"], free), compute(table["factors"], free), guess, known_values
+        )
 
 
-def _bind(target: Any, value: Any) -> Scope:
-    """Names with their values, for one or several targets."""
+def _bind_names(target: Any, value: Any) -> Scope:
+    """Names with their values, for an assignment to one or several names."""
     if hasattr(target, "elts"):
         return dict(zip((part.id for part in target.elts), value, strict=True))
     return {target.id: value}
 
 
-def _walk_all(nodes: Iterable[ast.AST], scope: Scope) -> list[Any]:
+def _evaluate_all(nodes: Iterable[ast.AST], scope: Scope) -> list[Any]:
     """Values of the elements of a list or a call, with starred elements unpacked."""
-    found: list[Any] = []
+    values: list[Any] = []
     for node in nodes:
-        found += _walk(node.value, scope) if isinstance(node, ast.Starred) else [_walk(node, scope)]
-    return found
+        values += _evaluate(node.value, scope) if isinstance(node, ast.Starred) else [_evaluate(node, scope)]
+    return values
 
 
-def _walk_loops(element: ast.expr, loops: Sequence[ast.comprehension], scope: Scope) -> list[Any]:
+def _evaluate_loops(element: ast.expr, loops: Sequence[ast.comprehension], scope: Scope) -> list[Any]:
     scopes = [scope]
     for loop in loops:
-        inner = [outer | _bind(loop.target, one) for outer in scopes for one in _walk(loop.iter, outer)]
-        scopes = [one for one in inner if all(_walk(condition, one) for condition in loop.ifs)]
-    return [_walk(element, one) for one in scopes]
+        inner = [outer | _bind_names(loop.target, item) for outer in scopes for item in _evaluate(loop.iter, outer)]
+        scopes = [scope for scope in inner if all(_evaluate(condition, scope) for condition in loop.ifs)]
+    return [_evaluate(element, scope) for scope in scopes]
 
 
-def _walk(node: ast.AST | None, scope: Scope) -> Any:  # noqa: PLR0911, PLR0912 - one case per kind of node
+def _evaluate(node: ast.AST | None, scope: Scope) -> Any:  # noqa: PLR0911, PLR0912 - one case per kind of node
     match node:
         case None:
             return None
@@ -148,25 +150,25 @@ def _walk(node: ast.AST | None, scope: Scope) -> Any:  # noqa: PLR0911, PLR0912 
         case ast.Name(id=name):
             return _look_up(name, scope)
         case ast.Attribute(value=owner, attr=name):
-            return _walk(owner, scope)[name]
+            return _evaluate(owner, scope)[name]
         case ast.Subscript(value=owner, slice=index):
-            return _walk(owner, scope)[_walk(index, scope)]
+            return _evaluate(owner, scope)[_evaluate(index, scope)]
         case ast.Slice(lower=lower, upper=upper, step=None):
-            return slice(_walk(lower, scope), _walk(upper, scope))
+            return slice(_evaluate(lower, scope), _evaluate(upper, scope))
         case ast.List(elts=parts):
-            return _walk_all(parts, scope)
+            return _evaluate_all(parts, scope)
         case ast.ListComp(elt=element, generators=loops):
-            return _walk_loops(element, loops, scope)
-        case ast.Call(func=function, args=parts, keywords=named):
-            keywords = {str(one.arg): _walk(one.value, scope) for one in named}
-            return _walk(function, scope)(*_walk_all(parts, scope), **keywords)
+            return _evaluate_loops(element, loops, scope)
+        case ast.Call(func=function, args=parts, keywords=keyword_nodes):
+            keywords = {str(keyword.arg): _evaluate(keyword.value, scope) for keyword in keyword_nodes}
+            return _evaluate(function, scope)(*_evaluate_all(parts, scope), **keywords)
         case ast.BoolOp(op=sign, values=parts):
-            return _OPERATORS[type(sign)](_walk(part, scope) for part in parts)
+            return _OPERATORS[type(sign)](_evaluate(part, scope) for part in parts)
         case ast.UnaryOp(op=sign, operand=operand):
-            return _OPERATORS[type(sign)](_walk(operand, scope))
+            return _OPERATORS[type(sign)](_evaluate(operand, scope))
         case ast.BinOp(left=left, op=sign, right=right):
-            return _OPERATORS[type(sign)](_walk(left, scope), _walk(right, scope))
-        case ast.Compare(left=left, ops=signs, comparators=others):
-            sides = _walk_all([left, *others], scope)
+            return _OPERATORS[type(sign)](_evaluate(left, scope), _evaluate(right, scope))
+        case ast.Compare(left=left, ops=signs, comparators=operands):
+            sides = _evaluate_all([left, *operands], scope)
             return all(_OPERATORS[type(sign)](*pair) for sign, *pair in zip(signs, sides, sides[1:], strict=False))
     raise SyntaxError(f"'{ast.unparse(node)}' is not an expression of the ledger")
