@@ -172,10 +172,10 @@ Parts = Iterator[tuple[Badge | str, ...] | Chapter | Block | str]
 """
 
 
-def count_things(things: Sized | int, one: str, many: str = "") -> str:
-    """Write a number of things, such as ``2 branches``; `many` is an irregular plural."""
+def count_things(things: Sized | int, singular: str, plural: str = "") -> str:
+    """Write a number of things, such as ``2 branches``; `plural` is needed only if it is irregular."""
     count = things if isinstance(things, int) else len(things)
-    return f"{count} {one if count == 1 else many or one + 's'}"
+    return f"{count} {singular if count == 1 else plural or singular + 's'}"
 
 
 def judge(holds: bool | None, text: str) -> Badge:

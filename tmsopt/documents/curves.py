@@ -221,7 +221,7 @@ def _write_classes(chart: Chart, data: Mapping[str, Any], plane: bool) -> Parts:
     if satisfied is not None and inequalities:
         yield f"the constraints hold on {100 * satisfied:.2f} %"
     for name in chart.left_aside if plane else ():
-        yield f"{name} is an equality, which holds on curves and not on a grid: left aside"
+        yield f"{name} is an equality, which holds on curves and not on a grid: ignored"
 
 
 def _tabulate_designs(chart: Chart) -> Parts:

@@ -24,8 +24,8 @@ from tmsopt.roots import Root
 BRIEF = 5
 """Significant digits of a number in a brief report."""
 ZERO_SHARE = 1e-14
-"""A part of a root, relative to its size, or a number relative to 1: if smaller, it is rounding and shown as 0."""
-_RANGE_ROUNDING = 1e-12  # a value whose ratio to the length of its range is smaller is rounding and shown as 0
+"""A number below this share of its scale (the size of a root, or 1) is only rounding and is shown as 0."""
+_RANGE_ROUNDING = 1e-12  # a value below this share of the length of its range is only rounding and is shown as 0
 PERCENT = Unit("%", 0.01)
 
 

@@ -25,10 +25,11 @@ from tmsopt.documents.design_rows import format_pair, format_root
 
 _MAX_COST, _ZERO = 0.05, 1e-9
 """Largest relative loss of decay and objective that rounding may cause; a smaller absolute loss than `_ZERO` is 0."""
-_SMALLEST_SHOWN, _ABSCISSA_ERROR = 1e-16, 1e-13
+_SMALLEST_SHOWN, _ROUNDING_ERROR = 1e-16, 1e-13
+"""A smaller singular value is shown as "below" this one; the error of an abscissa by rounding."""
 _UNRESOLVED = (
-    "no power of ε holds at two changes, one 100 times the other; state constants exactly, as in sqrt(2) or 8/3, or "
-    "solve with another value to see"
+    "no power of ε fits two changes that differ by a factor of 100; write constants exactly, such as sqrt(2) or 8/3, "
+    "or solve with another value"
 )
 
 
@@ -112,7 +113,7 @@ def tabulate_rounding(explanation: Explanation) -> TableBlock:
     rows: list[Row] = [("parameter", "rounded to", "abscissa", "abscissa rises by", *heads, "violated limits")]
     for label, value_text, row in labelled_rows:
         ratio = (f"{_drop_noise(row.damping_ratio):.4g}",) if has_ratios else ()
-        abscissa, loss = Cell(row.realised, error=_ABSCISSA_ERROR), f"{_drop_noise(row.loss):.2g}"
+        abscissa, loss = Cell(row.realised, error=_ROUNDING_ERROR), f"{_drop_noise(row.loss):.2g}"
         rows.append((label, value_text, abscissa, loss, *ratio, ", ".join(row.violations)))
     return TableBlock(rows, "What rounding does")
 
@@ -127,7 +128,7 @@ def write_optimality(optimality: Optimality, _level: Level = "full") -> Parts:
     """Write the verdict, then the multipliers of each rightmost root."""
     yield _judge_optimality(optimality)
     if optimality.verdict == NOT_COVERED:
-        yield Sentence(f"not judged, for {optimality.reason}", "local optimality")
+        yield Sentence(f"not judged: {optimality.reason}", "local optimality")
         return
     yield Sentence(optimality.reason, "local optimality")
     if optimality.roots:
@@ -149,7 +150,7 @@ def _list_root(root: RightmostRoot) -> tuple[str, ...]:
 
 def _drop_noise(x: float, size: float = 1.0) -> float:
     """Replace a number by 0 if it is only rounding compared with `size`."""
-    return 0.0 if abs(x) <= _ABSCISSA_ERROR * size else x
+    return 0.0 if abs(x) <= _ROUNDING_ERROR * size else x
 
 
 def write_diagnosis(diagnosis: Diagnosis, level: Level = "full") -> Parts:
@@ -166,7 +167,7 @@ def write_diagnosis(diagnosis: Diagnosis, level: Level = "full") -> Parts:
 def _describe_root(diagnosis: Diagnosis) -> str:
     vectors = count_things(diagnosis.geometric, "independent eigenvector")
     if diagnosis.jordan is None:
-        reason = "there are no matrices to judge by, so one chain of eigenvectors, as for a companion matrix"
+        reason = "without matrices, one chain of eigenvectors is assumed, as for a companion matrix"
     else:
         jordan = diagnosis.jordan
         zero = f"{jordan.zero:.1g}" if jordan.zero > _SMALLEST_SHOWN else f"below {_SMALLEST_SHOWN:g}"
@@ -196,7 +197,7 @@ def _describe_splitting(diagnosis: Diagnosis, full: bool) -> str:
         change = "relative change" if first.relative else "change"
         first_law = f"a {change} ε of {first.parameter} moves it by {_describe_laws(first, diagnosis)}"
         parts = [
-            f"{first_law}, within {100 * DEVIATION:.0f} % {_describe_range(first.laws[0])}, as sampled",
+            f"{first_law}, within {100 * DEVIATION:.0f} % {_describe_range(first.laws[0])} (sampled)",
             *([] if full else other_laws),
         ]
     if unmoved_names:

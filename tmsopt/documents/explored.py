@@ -35,7 +35,7 @@ def frame_explorer(result: Any, design: Solution | None) -> str:
     return (
         f"<p>Move a parameter, and see the {roots} move: disturbances die out where all are {side}.</p>\n"
         f"{frame(page_of(base, designs, trace_curves=True), 'Explorer of this problem')}\n"
-        '<p class="print">The explorer is in the file itself, not on paper.</p>'
+        '<p class="print">The explorer works in the file, not on paper.</p>'
     )
 
 
@@ -68,12 +68,12 @@ def _number_designs(designs: Iterable[NamedDesign]) -> list[NamedDesign]:
 def _list_front(front: "Front") -> Iterator[NamedDesign]:
     """List the point with the fastest decay, then all points with a label."""
     if front.points:
-        best = min(front.points, key=lambda p: _replace_nan(_decay_rate(front.problem.posed, p.solution)))
+        best = min(front.points, key=lambda p: _replace_nan(_scale_abscissa(front.problem.posed, p.solution)))
         yield best.label or "least abscissa", best.solution.parameters
     yield from ((point.label, point.solution.parameters) for point in front.points if point.label)
 
 
-def _decay_rate(problem: Posed, design: "Solution | Row") -> float:
+def _scale_abscissa(problem: Posed, design: "Solution | Row") -> float:
     """Return the abscissa in 1/s, or without a unit if the model has none; more negative is faster decay."""
     return design.abscissa / unit_at(problem, "abscissa", design.parameters).one
 
@@ -101,7 +101,7 @@ def _list_results(results: "Results") -> Iterator[NamedDesign]:
     """List the best row, and the row that decays most slowly."""
     problem = results.study.problem.posed
     finite_rows = [row for row in results.rows if math.isfinite(row.abscissa)]
-    rate = partial(_decay_rate, problem)
+    rate = partial(_scale_abscissa, problem)
     if finite_rows:
         best, slowest = results.summary.best or min(finite_rows, key=rate), max(finite_rows, key=rate)
         yield f"best, row {best.number}", best.parameters

@@ -25,7 +25,7 @@ _LONG_CELL = 24  # a column with a cell of more characters stays wide
 _MIN_FILTER_ROWS = 12  # a table with so many rows has a field that filters them
 _PAPER_ROWS = 100  # maximum number of rows of a table on paper; document.css has the same number
 _TITLED_FIELDS = ("problem", "asked", "study", "design")  # attributes of a result that may have a title
-_MAX_DRAWING_BYTES = 500_000  # a drawing with more bytes, such as thousands of marks, becomes an image of dots
+_MAX_DRAWING_BYTES = 500_000  # a drawing with more bytes, such as one of thousands of marks, is saved as a bitmap
 _DOTS_PER_INCH = 160
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 """Content Security Policy: the page loads nothing from any server."""
@@ -167,7 +167,7 @@ def _mark_table(grid: TableBlock, plain: bool) -> str:
     lines = "\n".join(f"<tr>{_mark_cells(row, kinds)}</tr>" for row in body)
     if plain:
         return f"<table>{head}<tbody>{lines}</tbody></table>"
-    note = f"On paper are the first {_PAPER_ROWS} of the rows that are shown."
+    note = f"On paper, the table ends after {_PAPER_ROWS} of the rows shown."
     paper = f'\n<p class="print">{note}</p>' if len(body) > _PAPER_ROWS else ""
     caption = escape_text(grid.caption)
     kind = f' class="sortable{" filterable" if len(body) >= _MIN_FILTER_ROWS else ""}"' if head else ""

@@ -31,7 +31,7 @@ from tmsopt.problem.verdict.stability import MARGINAL, UNSTABLE, power_of_t
 if TYPE_CHECKING:
     from tmsopt.dynamics import ModeShape, Simulation
 
-_SPEED_DIGITS = 15  # significant digits of a critical speed, which is computed that exactly
+_SPEED_DIGITS = 15  # significant digits of a critical speed; all of them are correct
 _WORDS = {"phi": "lean phi", "delta": "steer delta", "T_phi": "lean torque", "T_delta": "steer torque"}
 _COUNT_WORDS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 _MAX_LINEAR_ANGLE = 20.0  # degrees; for larger angles, the linear equations are not accurate
@@ -75,7 +75,7 @@ def _describe_cause(motion: "Simulation") -> str:
         root = "√s" if time == "s" else "(w/g)^(1/4)"
         level = f"{disturbance.noise:.6g} {torque} {root}"
         causes.append(f"in white noise of steer torque of {level} (seed {disturbance.seed})")
-    return ", ".join(causes) + (", as nothing else was asked" if disturbance.default else "")
+    return ", ".join(causes) + (" (the default disturbance)" if disturbance.default else "")
 
 
 def _list_peaks(motion: "Simulation") -> Iterator[Sequence[str]]:
@@ -115,21 +115,21 @@ def _write_notes(motion: "Simulation") -> Iterator[str]:
     yield from map(_describe_merging, merged.values())
     if merged:
         noun = "eigenfrequencies" if motion.problem.model.double else "roots"
-        rounding_note = "which rounding moves by no more than itself"
-        yield f"{noun}: of the ideal design; motion: of the design as stored, {rounding_note}"
+        rounding_note = "which rounding errors hardly change"
+        yield f"{noun}: of the ideal design; motion: of the stored design, {rounding_note}"
     if not motion.stable and (words := _describe_axis(motion)):
-        yield f"{words}; peaks are those of the time shown"
+        yield f"{words}; peaks are within the time shown"
     elif not motion.stable:
-        yield "not stable: it does not settle, and peaks are those of the time shown"
+        yield "not stable: the motion does not settle, and peaks are within the time shown"
     elif not noisy and any(math.isnan(m.settling) for m in motion.measures):
-        yield "stable, but it dies out too slowly for a settling time: peaks are those of the time shown"
+        yield "stable, but the motion decays too slowly for a settling time; peaks are within the time shown"
     elif not noisy:
-        yield "stable; peaks, overshoots and settling times are those of the whole motion, however long is shown"
+        yield "stable; peaks, overshoots and settling times are of the whole motion, not only of the time shown"
     if "x" in motion.columns:
         end = {n: motion.columns[n][-1] for n in ("x", "y_rear", "psi")}
         distance, offset, heading = (_unit_in(motion, n).show(abs(x)) for n, x in end.items())
         side, turn = ("right" if end[n] >= 0 else "left" for n in ("y_rear", "psi"))
-        yield f"at the end: {distance} on, {offset} to the {side}, heading {heading} to the {turn}"
+        yield f"at the end: {distance} forward, {offset} to the {side}, turned {heading} to the {turn}"
         angles = [abs(m.peak) for m in motion.measures if motion.units.get(m.name) == "rad"]
         if max(angles) > math.radians(_MAX_LINEAR_ANGLE):
             yield f"beyond {_MAX_LINEAR_ANGLE:.0f} deg, trust the timing of the linear equations, not the amplitude"
@@ -160,9 +160,10 @@ def _describe_merging(mode: "ModeShape") -> str:
     number = _COUNT_WORDS.get(k, str(k))
     roots, wave = ("eigenfrequencies", "e^(-i omega t)") if of_H else ("roots", "e^(st)")
     if mode.geometric == k:
-        return f"{number} {roots} meet and keep {number} shapes: no chain, no power of t"
+        return f"{number} {roots} coincide and keep {number} mode shapes: no Jordan chain, no power of t"
     if mode.geometric > 1:
-        return f"{number} {roots} meet in {mode.geometric} shapes, Jordan chains of {', '.join(map(str, mode.partial))}"
+        lengths = ", ".join(map(str, mode.partial))
+        return f"{number} {roots} coincide with {mode.geometric} mode shapes and Jordan chains of {lengths}"
     top = "t" if k == 2 else f"t^{k - 1}"
     return f"{name}: {number} modes merge in one shape, a Jordan chain of {k}: the motion has terms up to {top} {wave}"
 
@@ -201,8 +202,8 @@ def write_speeds(speeds: Speeds, level: Level) -> Parts:
 def _tabulate_crossings(speeds: Speeds, unit: Unit, real: bool) -> Block | str:
     if not speeds.found:
         root, axis = ("root", "imaginary") if real else ("eigenfrequency", "real")
-        exception = f"besides what holds for every {speeds.parameter}, " if speeds.always else ""
-        return f"{exception}no {root} meets another or the {axis} axis"
+        exception = f", apart from what holds for every {speeds.parameter}" if speeds.always else ""
+        return f"no {root} meets another {root} or the {axis} axis{exception}"
     other_parameters = {n: x for n, x in speeds.parameters.items() if n != speeds.parameter}
     rate_unit = common_unit(speeds.problem.posed, "abscissa", other_parameters)
     roots = f"root {rate_unit.text}".rstrip() if real else "eigenfrequency"

@@ -48,8 +48,8 @@ def write_comparison(comparison: Comparison, _level: Level) -> Parts:
     else:
         yield Chapter("laws")
         model_name = f"the {model.title}" if model.statement is None else f"'{model.title}'"
-        of_skates = "" if model.carrier is not None else ", only of skates (tms)"
-        yield f"no laws are known of {model_name}{of_skates}"
+        of_skates = "" if model.carrier is not None else ", only for skates (tms)"
+        yield f"no laws are known for {model_name}{of_skates}"
     yield Chapter("formulations")
     if comparison.other is None:
         yield Sentence(f"none, {comparison.reason}", "other formulation")

@@ -54,7 +54,7 @@ def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None)
         return
     problem = proof.problem.posed
     if problem.scenarios or problem.tolerances:
-        yield "for the worst case that was found"
+        yield "for the worst case found"
     if not proof.parameters:
         return
     if rows := list_numbers(problem, proof):
@@ -217,7 +217,7 @@ def _list_designs(result: Every, complete: bool) -> list[Row]:
 def _describe_proof(proof: Completeness, effort: str) -> Iterator[str]:
     for k, limit in enumerate(proof.limits, start=1):
         if limit:
-            yield f"solution {k} lies on a limit, {limit}, as far as 25 digits tell: it may be just beyond"
+            yield f"solution {k} lies on the limit {limit} to 25 digits: it may be just outside"
     if proof.complete:
         return
     proved_text = f"; {len(proof.designs)} proved" if proof.designs else ""
@@ -234,6 +234,6 @@ def _describe_coverage(coverage: Coverage) -> Iterator[str]:
     doubt = singular if coverage.singular else ""
     yield (
         f"coverage of a search: {coverage.starts} starts over the box{doubt}; "
-        f"{coverage.expected:.2f} solutions to be expected in all; "
+        f"{coverage.expected:.2f} solutions are expected in total; "
         f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"
     )

@@ -211,7 +211,7 @@ def save_report(
     extra_sections = (
         (Chapter("explorer", width="whole"), frame_explorer(result, design)),
         (Chapter("text", "As text", "whole"), f"<details><summary>The report as text</summary>{text}</details>"),
-        (Chapter("origin", "Where it is from", "whole"), origin),
+        (Chapter("origin", "Origin", "whole"), origin),
     )
     write_text(place, to_page(document, extra_sections))
 

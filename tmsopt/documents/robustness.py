@@ -33,19 +33,20 @@ def describe_robustness(robustness: Robustness, on_edge: bool = False) -> str:
     """Describe the smallest change that makes a design unstable (or stable), its cause, and its main parameters.
 
     Args:
-        on_edge: whether the exact solution is on the edge of stability; its stored numbers may miss it.
+        on_edge: whether the ideal design is on the edge of stability; its stored numbers may miss it.
     """
     if robustness.edges:
         edge = _ON_EDGE if robustness.problem.model.carrier is None else _OF_H
         edge_names = " and ".join(edge[kind] for kind in robustness.edges)
         if robustness.zeros:
-            return f"at its edge already: {', '.join(f'{n} = 0' for n in robustness.zeros)} ({edge_names})"
-        return f"none, on the edge of stability already, with {edge_names}"
+            zeros = ", ".join(f"{n} = 0" for n in robustness.zeros)
+            return f"none: the design is on the edge of stability, because {zeros} ({edge_names})"
+        return f"none: the design is on the edge of stability, with {edge_names}"
     if on_edge:
-        return "none, on the edge of stability already, up to rounding errors"
+        return "none: the design is on the edge of stability, up to rounding errors"
     limit, new_state = robustness.limit, "unstable" if robustness.stable else "stable"
     if not limit.found:
-        return f"{'' if robustness.stable else 'not stable; '}no change in reach of the search makes it {new_state}"
+        return f"{'' if robustness.stable else 'not stable; '}the search found no change that makes it {new_state}"
     if not robustness.stable:
         return f"not stable; {_describe_size(robustness)} makes it stable{_name_largest(limit)}"
     cause = words_of(robustness.problem.model).get(limit.kind, "a root passes through infinity, a0 = 0")

@@ -109,7 +109,7 @@ def write_solution(
     yield Chapter("limits", width="wide")
     yield from _write_limits(solution, explanation, full, page)
     if not brief:
-        yield Chapter("sureness", "How sure it is")
+        yield Chapter("sureness", "How certain it is")
     yield from _write_sureness(solution, explanation, brief, full)
     if brief:
         yield _suggest_more(solution, analysis)
@@ -117,7 +117,7 @@ def write_solution(
     if full:
         yield Chapter("roots")
         if solution.multiple_as_rounded:
-            yield "roots coincide up to rounding errors; tmsopt prove tells it of the numbers as typed"
+            yield "roots coincide up to rounding errors; tmsopt prove decides it for the numbers as typed"
         for diagnosis in analysis.diagnoses:
             yield from write_diagnosis(diagnosis)
     yield Chapter("quantities", "Derived quantities", "wide")
@@ -235,11 +235,12 @@ def _write_cases(solution: Solution, worst: Case) -> Parts:
     """Write the worst case, other extreme cases, and a bound for all cases."""
     problem, cover, least_damped, fastest = solution.problem, solution.cover, solution.least_damped, solution.fastest
     yield Sentence(
-        f"{_describe_case(problem, worst)}; motion and roots are of this case, all else is nominal", "worst case"
+        f"{_describe_case(problem, worst)}; motion and roots belong to this case, all else to the nominal design",
+        "worst case",
     )
     if least_damped not in (None, worst) and problem.model.carrier is None:
         label = "least damped case found" if problem.tolerances else "least damped case"
-        yield Sentence(f"{_describe_case(problem, least_damped)}; the damping ratio is of this case", label)
+        yield Sentence(f"{_describe_case(problem, least_damped)}; the damping ratio belongs to this case", label)
     if fastest not in (None, worst):
         yield Sentence(
             f"{_describe_case(problem, fastest)}; limits on the frequency apply to this case", "fastest case"
@@ -262,13 +263,13 @@ def _write_limits(solution: Solution, explanation: Explanation | None, full: boo
     names = dict.fromkeys((*solution.problem.constraints, *solution.violations))
     if page and names:
         rows = ((n, _describe_limit(solution, n), _describe_standing(solution, n)) for n in names)
-        yield TableBlock((("limit", "says", "stands"), *rows), "Limits, and how they stand")
+        yield TableBlock((("limit", "condition", "status"), *rows), "Limits and their status")
     if explanation is None:
         return
     if explanation.levers:
         head = ("active limit", "value", "if relaxed by", "improvement (first order)")
         lever_rows = (_list_lever(solution, lever) for lever in explanation.levers)
-        yield TableBlock((head, *lever_rows), "What the active limits are worth", max_rows=_MAX_LIMITS)
+        yield TableBlock((head, *lever_rows), "Effect of the active limits", max_rows=_MAX_LIMITS)
         yield from (lever.sentence for lever in explanation.levers if full)
     yield from (Sentence(text, "warning", "doubt") for text in explanation.warnings)
 
@@ -303,7 +304,7 @@ def _list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
     """List name and text of an active limit, a small relaxation of it, and the improvement to first order."""
     limit = limit_text(solution.problem.posed, lever.name)
     if not lever.step:
-        return lever.name, limit, "a physical end", ""
+        return lever.name, limit, "a physical limit", ""
     step = unit_of(solution.problem.posed, lever.name).show(abs(lever.step), 4)
     return lever.name, limit, step, lever.gained.show(lever.predicted, 3)
 

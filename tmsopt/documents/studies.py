@@ -40,7 +40,7 @@ def write_results(results: Results, level: Level) -> Parts:
     if page:
         random = study.method == "monte_carlo"
         caption = "How the designs are distributed" if random else "The objective over what varies"
-        yield Chapter("picture", "Rows together")
+        yield Chapter("picture", "All rows")
         yield Figure(plots.draw_histogram, results, caption)
         rows, notes = thin_rows(results.rows, "rows", "tmsopt study FILE --export rows.csv writes all")
     else:
@@ -53,7 +53,7 @@ def write_results(results: Results, level: Level) -> Parts:
         priorities = [9, 8, *[7] * len(study.columns), 6, *[4] * (len(cells[0]) - len(study.columns) - 3)]
         yield TableBlock(cells, "Rows of the study", priorities, hint="--export rows.csv")
     yield from notes
-    yield Chapter("facts", "Together")
+    yield Chapter("facts", "Statistics")
     yield from _write_facts(study, summary)
     if page:
         yield from write_question(study.problem.posed)

@@ -122,8 +122,8 @@ def _lay_out_table(grid: TableBlock, width: int, ascii_only: bool, full: bool) -
     else:
         visible_columns = list(filled_columns)
         while len(visible_columns) > 1 and _measure_width([columns[k] for k in visible_columns]) > width:
-            least = min(reversed(visible_columns), key=lambda k: grid.priorities[k] if grid.priorities else 0)
-            visible_columns.remove(least)
+            column_number = min(reversed(visible_columns), key=lambda k: grid.priorities[k] if grid.priorities else 0)
+            visible_columns.remove(column_number)
         yield from _align([columns[k] for k in visible_columns], width)
         hidden_rows = len(body) - len(row_numbers)
         hidden_columns = [columns[k][0] for k in filled_columns if k not in visible_columns and head[k]]

@@ -124,7 +124,7 @@ def converted_file(given: Given, **options: Any) -> str:
         lines.append("I_xx = m (width^2 + height^2)/12, I_zz = m (length^2 + width^2)/12, in kg m^2, and I_xz = 0.")
     radius = 0.125 * _find_middle(problem, "w")
     lines += [
-        "A wheel of 1 kg, a solid disc, under [parameters]; likewise at the rear with R for F:",
+        "Example: a front wheel of 1 kg, a solid disc, under [parameters]; for the rear wheel, write R instead of F:",
         f"  r_F = {radius:.4g}",
         "  m_F = 1",
         f"  I_Fxx = {radius**2 / 4:.4g}    # m r^2/4 about a diameter",
@@ -139,7 +139,7 @@ def _list_unconvertible(problem: Posed, to: str, inertia: str) -> Iterator[Fault
         yield Fault(f"found the model {short(problem.model.name)}; accepted: tms", ("model",))
     elif problem.parameter_set.rate is None:
         names = ", ".join(problem.parameter_set.names[:3])
-        message = f"is written in numbers without units ({names}, …), and a body has a size and a mass"
+        message = f"uses numbers without units ({names}, …), but a body has a size and a mass"
         yield Fault(f"{message}; write it in SI: w, v, m_B, x_B, …", ("parameters",))
     if to != whipple.name:
         yield Fault(f"found {short(to)}; accepted: {whipple.name}", ("to",))
