@@ -362,7 +362,8 @@ def test_an_oscillator_without_damping_is_on_the_edge(m, c, k, edges, zeros):
     if edges:
         assert found.limit.kind == edges[0]
         assert found.limit.distance == found.radius == found.to_stability == 0
-        told = f"at its edge already: {zeros[0]} = 0" if zeros else "none, on the edge of stability already"
+        reason = f", because {zeros[0]} = 0" if zeros else ", with"
+        told = f"none: the design is on the edge of stability{reason}"
         assert describe_robustness(found).startswith(told)
         assert "-0" not in found.report()
 

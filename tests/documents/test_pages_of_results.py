@@ -273,11 +273,11 @@ def test_what_limits_are_worth():
     """As the explanation has it, the most valuable first."""
     solution, tables = robot(), page("robot").tables
     levers = tmsopt.explain(solution, resolve=False).levers
-    worth = tables["What the active limits are worth"][1:]
+    worth = tables["Effect of the active limits"][1:]
     assert [row[0] for row in worth] == [lever.name for lever in levers]
     for row, lever in zip(worth, levers, strict=True):
         assert float(row[-1].split()[0]) == pytest.approx(lever.predicted / lever.gained.one, rel=5e-3)
-    stands = {row[0]: row[-1] for row in tables["Limits, and how they stand"][1:]}
+    stands = {row[0]: row[-1] for row in tables["Limits and their status"][1:]}
     assert stands["steer_arm"] == "active"
     assert stands["rear_wheel_holds"] == f"holds by {solution.quantities['N_R'] - 20:.4g} N"
     assert set(stands) == set(solution.problem.constraints)
@@ -287,7 +287,7 @@ def test_what_limits_are_worth():
 def test_an_infeasible_page_says_what_is_violated_and_what_to_try():
     solution, text = infeasible(), written("infeasible")
     assert solution.status == "infeasible"
-    stands = {row[0]: row[-1] for row in page("infeasible").tables["Limits, and how they stand"][1:]}
+    stands = {row[0]: row[-1] for row in page("infeasible").tables["Limits and their status"][1:]}
     for name, amount in solution.violations.items():
         assert stands[name] == f"violated by {amount:.4g}"
     both = "infeasible: no design was found that meets both decay (abscissa &lt;= -1) and slow (Fr &lt;= 1)"

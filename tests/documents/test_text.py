@@ -72,7 +72,7 @@ ROWS = (
 
 
 def test_a_narrow_screen_loses_the_least_needed_column_and_says_so():
-    grid = TableBlock(ROWS, needs=(9, 1, 8, 5))
+    grid = TableBlock(ROWS, priorities=(9, 1, 8, 5))
     assert "found by" in lines(grid, width=60)[1]
     told = lines(grid, width=40)
     assert told[1].split() == ["speed", "abscissa", "remark"]
@@ -80,10 +80,10 @@ def test_a_narrow_screen_loses_the_least_needed_column_and_says_so():
 
 
 def test_rows_that_are_left_out_are_counted():
-    told = lines(TableBlock(ROWS, most=3))
+    told = lines(TableBlock(ROWS, max_rows=3))
     assert len(told) == 1 + 1 + 3 + 1
     assert "6 more rows" in told[-1]
-    kept = lines(TableBlock(ROWS, most=4, keep=frozenset({8})))
+    kept = lines(TableBlock(ROWS, max_rows=4, keep=frozenset({8})))
     assert any(line.split()[0] == "8" for line in kept[2:-1])
 
 
@@ -96,7 +96,7 @@ def test_a_full_document_has_every_column_whatever_the_width():
 
 
 def test_many_rows_without_headings_stand_side_by_side():
-    rows = [("", ""), *((f"p{k}", Cell(k, Unit("cm", 0.01), named=True)) for k in range(10))]
+    rows = [("", ""), *((f"p{k}", Cell(k, Unit("cm", 0.01), with_unit=True)) for k in range(10))]
     told = lines(TableBlock(rows, fold=5))
     assert told[1].split() == ["p0", "0", "cm", "p5", "500", "cm"]
     assert len(told) == 6

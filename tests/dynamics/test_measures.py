@@ -124,7 +124,7 @@ def test_what_dies_out_too_slowly_is_said():
     motion = tmsopt.simulate(spring(1e-9), start={"q1": 1})
     assert motion.stable
     assert math.isnan(motion.measures[0].settling)
-    assert "stable, but it dies out too slowly for a settling time" in str(motion)
+    assert "stable, but the motion decays too slowly for a settling time" in str(motion)
     assert len(tmsopt.plots.draw_motion(motion).patches) == 0
 
 
@@ -227,7 +227,7 @@ def test_modes_that_only_cross_keep_their_shapes():
     assert [(m.multiplicity, m.geometric, m.partial) for m in motion.modes] == [(2, 2, (1, 1))] * 2
     shapes = np.array([[m.amplitudes["q1"], m.amplitudes["q2"]] for m in motion.modes])
     assert abs(np.linalg.det(shapes)) > 0.1
-    assert "two roots meet and keep two shapes" in str(motion)
+    assert "two roots coincide and keep two mode shapes" in str(motion)
 
 
 # The command
@@ -308,11 +308,11 @@ def test_without_a_design_there_is_no_motion(tmp_path):
 
 def test_the_default_and_units_are_said():
     text = str(tmsopt.simulate(ep4()))
-    assert "from lean phi = 1 deg, as nothing else was asked" in text
+    assert "from lean phi = 1 deg (the default disturbance)" in text
     assert "√(w/g)" in text
     pushed = str(tmsopt.simulate(ep4(), push=0.001, noise=0.1, seed=5))
     assert "an impulse of steer torque of 0.001 m_B g w √(w/g)" in pushed
     assert "white noise of steer torque of 0.1 m_B g w (w/g)^(1/4) (seed 5)" in pushed
     fast = tmsopt.simulate(tmsopt.Problem(whipple, fixed={**tmsopt.load(BENCHMARK).fixed, "v": 2.0}), lean=1)
-    assert "not stable: it does not settle" in str(fast)
+    assert "not stable: the motion does not settle" in str(fast)
     assert all(math.isnan(m.settling) for m in fast.measures)

@@ -79,12 +79,12 @@ def test_the_examples_are_found_where_they_are_installed(tmp_path, monkeypatch):
     (site / "tmsopt-1.dist-info" / "METADATA").write_text("Name: tmsopt\nVersion: 1\n")
     (site / "tmsopt-1.dist-info" / "RECORD").write_text(f"tmsopt/a.toml,,\n../../{place}/mine.toml,,\n")
     room = import_module("tmsopt.guide.examples")
-    room._files.cache_clear()
+    room._find_files.cache_clear()
     with monkeypatch.context() as patched:
         patched.setattr(room, "__file__", str(site / "tmsopt" / "guide" / "examples.py"))
         patched.syspath_prepend(site)
         assert examples() == {"mine": "Mine"}
-    room._files.cache_clear()
+    room._find_files.cache_clear()
     assert "ep4" in examples()
 
 

@@ -538,7 +538,7 @@ def test_import_command(tmp_path, run):
 def test_compare_says_that_its_laws_are_of_skates(run):
     code, out, _ = run("compare", "problems/whipple_trail.toml")
     assert code == 0
-    assert "no laws are known of the Carvallo–Whipple bicycle" in out
+    assert "no laws are known for the Carvallo–Whipple bicycle" in out
     assert "matching minus abscissa" in out
 
 

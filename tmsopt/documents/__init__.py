@@ -1,7 +1,7 @@
-"""What a result shows of itself: one document for each, and its renderers as text, as HTML and as one line.
+"""Documents: one for each kind of result, and their renderers as text, as HTML and as one line.
 
-In: any result; `tmsopt.records.Printable` asks here. Out: text, Axes, HTML. Open `blocks` first: what documents are
-made of; then `results`: the table of all results, and `solution`: the document that most readers meet.
+In: any result; the methods of `tmsopt.records.Printable` call this package. Out: text, Axes, HTML. Open `blocks` first:
+it defines what documents consist of. Then open `results`, the table of all results, and `solution`, the main report.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""What a report says of a solution beyond its numbers, each part computed when it is first asked for, and kept."""
+"""The analyses of a solution that its report shows. Each one is computed at its first use and then stored."""
 
 import math
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from tmsopt.progress import Listener, start_steps
 
 @dataclass(eq=False)
 class Analysis:
-    """Each part is None, or empty, where it does not apply.
+    """The analyses of one solution. An analysis that does not apply is None or empty.
 
     Example:
         >>> analysis = tmsopt.solve("problems/benchmark.toml").analysis
@@ -31,7 +31,7 @@ class Analysis:
 
     @contextmanager
     def report_progress(self, progress: Listener | None) -> Iterator["Analysis"]:
-        """Tell a listener of the parts that are computed meanwhile."""
+        """Report progress to a listener while analyses are computed in this context."""
         self._progress = progress
         try:
             yield self
@@ -40,32 +40,32 @@ class Analysis:
 
     @cached_property
     def explanation(self) -> Explanation | None:
-        """Active limits and their worth to first order, warnings, rounding, local optimality."""
+        """Active limits and their effect to first order, warnings, rounding, local optimality."""
         return None if self.solution.interrupted else explain(self.solution, resolve=False, progress=self._progress)
 
     @cached_property
     def full_explanation(self) -> Explanation | None:
-        """The same with each active limit moved and the problem solved again."""
+        """The explanation with each active limit moved and the problem solved again."""
         return None if self.solution.interrupted else explain(self.solution, progress=self._progress)
 
     @cached_property
     def robustness(self) -> Robustness | None:
-        """The nearest boundary of stability."""
-        if not self._sought:
+        """The nearest boundary of stability, without that of heavy damping."""
+        if not self._can_be_analysed:
             return None
         start_steps(self._progress, "looking for the nearest boundaries")
         return find_stability_margins(self.solution.problem.posed, self.solution.parameters)
 
     @cached_property
     def boundaries(self) -> Robustness | None:
-        """The same, and the boundary of heavy damping."""
-        return robustness(self.solution, progress=self._progress) if self._sought else None
+        """The nearest boundaries of stability and of heavy damping."""
+        return robustness(self.solution, progress=self._progress) if self._can_be_analysed else None
 
     @cached_property
     def stable_speeds(self) -> tuple[tuple[float, float], ...] | None:
-        """Bands of the speed in which the design is stable; None for one with several speeds, or without any."""
+        """Bands of the speed in which the design is stable; None if it has no speed or several speeds."""
         try:
-            return stable_speeds(self.solution) if self._sought else None
+            return stable_speeds(self.solution) if self._can_be_analysed else None
         except InputError:
             return None
 
@@ -77,11 +77,11 @@ class Analysis:
 
     @cached_property
     def obstacles(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """What stands in the way of an answer, in short, and what there is to say beyond that."""
+        """Sentences on why the problem has no answer: for a brief report, and further ones for a full report."""
         brief, full = (infeasible_sentences(self.solution, full) for full in (False, True))
         return tuple(brief), tuple(full[len(brief) :])
 
     @property
-    def _sought(self) -> bool:
-        found = self.solution
-        return math.isfinite(found.abscissa) and found.status != "infeasible" and not found.interrupted
+    def _can_be_analysed(self) -> bool:
+        solution = self.solution
+        return math.isfinite(solution.abscissa) and solution.status != "infeasible" and not solution.interrupted

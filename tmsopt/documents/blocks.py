@@ -1,4 +1,4 @@
-"""A result as a document: sections of a few kinds of blocks. Renderers know these kinds, and no result."""
+"""A document is a result as chapters of blocks. Renderers know the few kinds of blocks, but no kind of result."""
 
 from collections.abc import Callable, Iterator, Sequence, Sized
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 Level = Literal["brief", "full", "page"]
-"""How much a document holds: the answer on a screen, everything as text, everything with pictures and long tables."""
+"""How much a document holds: a short answer, everything as text, or everything with pictures and long tables."""
 
 Tone = Literal["", "answer", "good", "doubt", "bad", "dim"]
-"""What a sentence, a table or a word tells: the answer itself, a verdict, or what is fixed anyway."""
+"""The role of a sentence, a table or a word: the answer itself, a verdict, or (dim) something that cannot change."""
 
 NO_UNIT = Unit()
-ALL = 12
-"""Digits of a number that is shown in full."""
+ALL_DIGITS = 12
+"""Significant digits of a number that is shown in full."""
 
 
 @dataclass(frozen=True)
@@ -27,21 +27,21 @@ class Cell:
 
     Attributes:
         value: in SI and rad, or in the model's own units.
-        unit: in which it is shown.
-        digits: at most.
-        error: of the value; digits that it makes uncertain are left out.
-        named: whether the unit stands behind the number; else in a heading or in a column of its own.
+        unit: unit in which the number is shown.
+        digits: maximum number of significant digits.
+        error: error of the value; digits that the error makes uncertain are left out.
+        with_unit: whether the unit follows the number; otherwise a heading or another column shows it.
     """
 
     value: float
     unit: Unit = NO_UNIT
-    digits: int = ALL
+    digits: int = ALL_DIGITS
     error: float = 0.0
-    named: bool = False
+    with_unit: bool = False
 
     def __str__(self) -> str:
         number = self.unit.number(self.value, self.digits, self.error)
-        return f"{number} {self.unit.text}" if self.named and self.unit.text and number != "none" else number
+        return f"{number} {self.unit.text}" if self.with_unit and self.unit.text and number != "none" else number
 
 
 Row = Sequence[Cell | str]
@@ -49,7 +49,7 @@ Row = Sequence[Cell | str]
 
 @dataclass(frozen=True)
 class Sentence:
-    """A sentence, under a label where it is one of several facts."""
+    """A sentence; with a label if it is one of several facts."""
 
     text: str
     label: str = ""
@@ -58,7 +58,7 @@ class Sentence:
 
 @dataclass(frozen=True)
 class Listing:
-    """Labels with what belongs to each, such as the data of an entry."""
+    """Labels, each with its text, such as the data of an entry."""
 
     items: tuple[tuple[str, str], ...]
     title: str = ""
@@ -69,22 +69,22 @@ class TableBlock:
     """A table.
 
     Attributes:
-        rows: headings, then the cells of each row; without headings where the first row is empty.
-        caption: for a page.
-        needs: how much each column is needed; on a narrow screen the least needed one is left out first, and of equals
-            the last one. By default each column is needed as much as any.
-        most: rows that a brief document shows; the others are counted.
-        keep: numbers of rows that stay; the others that are shown are spread evenly, and not just the first.
-        rest: where all rows and columns are.
-        fold: rows from which a table without headings stands in several columns, where there is room.
+        rows: headings, then the cells of each row. If all headings are empty, the table has none.
+        caption: caption on a page.
+        priorities: importance of each column. A narrow screen leaves out the least important column first; among equal
+            ones, the last. By default all columns are equal.
+        max_rows: maximum number of rows in a brief document, which counts the other rows.
+        keep: indices of rows that are always shown; the other rows shown are then spread evenly.
+        hint: the options that print all rows and columns.
+        fold: a table without headings and with more rows is laid out in several columns, if there is room.
     """
 
     rows: Sequence[Row]
     caption: str = ""
-    needs: Sequence[int] = ()
-    most: int | None = None
+    priorities: Sequence[int] = ()
+    max_rows: int | None = None
     keep: frozenset[int] = frozenset()
-    rest: str = "--full"
+    hint: str = "--full"
     fold: int = 0
     tone: Tone = ""
 
@@ -96,10 +96,10 @@ class TableBlock:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture, drawn where it is shown.
+    """A picture, which the renderer draws.
 
     Attributes:
-        draw: of a result, which it gets without its titles: they stand above its pictures already.
+        draw: draws the result. The renderer first removes the titles of the result, which the page shows above.
     """
 
     draw: "Callable[[Any], Axes | Drawing]"
@@ -109,7 +109,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Verbatim:
-    """Lines to be shown as they are, such as a sketch."""
+    """Lines that are shown unchanged, such as a sketch."""
 
     text: str
     label: str
@@ -123,10 +123,10 @@ class Chapter:
     """Blocks under a name.
 
     Attributes:
-        name: by which a page links to it.
-        heading: in words; by default the name.
-        width: how much of a page it takes: a column, ``wide`` or ``whole``.
-        blocks: those that follow it, until the next chapter.
+        name: target of links on a page.
+        heading: heading in words; by default the name.
+        width: width on a page: empty for a column, ``wide`` or ``whole``.
+        blocks: the blocks between this chapter and the next.
     """
 
     name: str
@@ -154,8 +154,8 @@ class Document:
 
     Attributes:
         kind: the class of the result.
-        title: of its problem; empty without one.
-        words: what it is and how it ended.
+        title: title of the problem; empty if it has none.
+        words: what the result is and how the computation ended.
     """
 
     kind: str
@@ -166,25 +166,25 @@ class Document:
 
 
 Parts = Iterator[tuple[Badge | str, ...] | Chapter | Block | str]
-"""A document in the order in which it is read: its words, then chapters, each before its blocks; a text is a sentence.
+"""A document in reading order: its words, then chapters, each followed by its blocks. A plain text is a sentence.
 
-Empty words and sentences are left out, and the words of a result that is a part of another one.
+`document_of` leaves out empty words and sentences, and the words of a result inside another result.
 """
 
 
-def count_things(things: Sized | int, one: str, many: str = "") -> str:
-    """A number of things in words, such as ``2 branches``."""
+def count_things(things: Sized | int, singular: str, plural: str = "") -> str:
+    """Write a number of things, such as ``2 branches``; `plural` is needed only if it is irregular."""
     count = things if isinstance(things, int) else len(things)
-    return f"{count} {one if count == 1 else many or one + 's'}"
+    return f"{count} {singular if count == 1 else plural or singular + 's'}"
 
 
 def judge(holds: bool | None, text: str) -> Badge:
-    """A verdict: a text, or that it is not so; empty where it is not known."""
+    """Write a verdict: the text, or "not" and the text; empty if the answer is unknown."""
     if holds is None:
         return Badge("")
     return Badge(text, "good") if holds else Badge(f"not {text}", "bad")
 
 
 def say_whether(value: bool | None) -> str:
-    """For a table; empty where it is not known."""
+    """Write yes or no for a table; empty if the answer is unknown."""
     return "" if value is None else "yes" if value else "no"

@@ -1,4 +1,4 @@
-"""Traces with their branches, charts, domains and swallowtails: what is drawn over parameters."""
+"""Documents of traces with their branches, of charts, domains and swallowtails."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -11,7 +11,7 @@ import numpy as np
 from tmsopt import plots
 from tmsopt.charts.chart import Chart
 from tmsopt.documents.blocks import (
-    ALL,
+    ALL_DIGITS,
     Cell,
     Chapter,
     Figure,
@@ -22,7 +22,7 @@ from tmsopt.documents.blocks import (
     TableBlock,
     count_things,
 )
-from tmsopt.documents.tables import MOST, format_value, thin_rows, write_question
+from tmsopt.documents.tables import MAX_ROWS, format_value, thin_rows, write_question
 from tmsopt.models import Model, in_words_of
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.problem import Posed
@@ -32,14 +32,14 @@ from tmsopt.tracing.branch import Branch, Trace, kinds_along
 from tmsopt.tracing.domain import Domain
 from tmsopt.tracing.swallowtail import Swallowtail
 
-_POINTS = 800 * 800  # of a chart that a picture shows
-_SHORT = 6  # digits of a point on a page
-_ROUNDING = 1e-14  # mismatch of a coefficient at which a point has them all
-_FITTING = 1e-6  # mismatch of a coefficient beyond which a point does not belong to its branch
+_MAX_PICTURE_POINTS = 800 * 800  # a picture of a chart shows at most so many grid points
+_POINT_DIGITS = 6  # significant digits of a point on a page
+_ROUNDING_MISMATCH = 1e-14  # a smaller mismatch of the coefficients is only rounding: all digits are shown
+_MAX_MISMATCH = 1e-6  # with a larger mismatch of its coefficients, a point does not belong to the branch
 
 
 def write_trace(trace: Trace, level: Level) -> Parts:
-    """Branches with their events, in the free parameters."""
+    """Write the branches with their events, in the free parameters."""
     counts = count_things(trace.points, "point"), count_things(trace.events, "event")
     yield trace.pattern, count_things(trace.branches, "branch", "branches"), *counts
     problem, model = trace.problem.posed, trace.problem.model
@@ -58,7 +58,7 @@ def write_trace(trace: Trace, level: Level) -> Parts:
 
 
 def describe_trace(trace: Trace) -> str:
-    """How many branches and points, and what they took."""
+    """Count branches and points, and state the time they took."""
     per_point = 1e6 * trace.seconds_walking / max(trace.points, 1)
     points = f", {trace.points} points, {per_point:.0f} µs per point" if trace.points else ""
     count = count_things(trace.branches, "branch", "branches")
@@ -68,29 +68,29 @@ def describe_trace(trace: Trace) -> str:
 
 def _describe_branch(branch: Branch, trace: Trace) -> str:
     share = f"{100 * float(np.mean(branch.stable)):.0f} % of its points"
-    rest = pattern_of(trace.problem.model, branch.pattern).rest
-    states = f"{'bounds stability' if rest else 'stable'} on {share}"
+    remaining_factor = pattern_of(trace.problem.model, branch.pattern).rest
+    states = f"{'bounds stability' if remaining_factor else 'stable'} on {share}"
     if any(not c.equality for c in trace.problem.posed.conditions.values()):
         states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
     form = "closed" if branch.closed else "open"
-    doubt = "" if branch.residual <= _FITTING else " (too large)"
+    doubt = "" if branch.residual <= _MAX_MISMATCH else " (too large)"
     kinds = in_words_of(trace.problem.model, " and ".join(dict.fromkeys(kinds_along(branch))))
     return f"{kinds}, {len(branch)} points, {form}, {states}, coefficient error {branch.residual:.0e}{doubt}"
 
 
 def list_events(branch: Branch, units: Mapping[str, Unit], model: Model | None = None) -> list[Row]:
-    """Headings, and the cells of each event, to as many digits as its coefficients are met, in these units."""
+    """List headings and the cells of each event, in these units, with the digits that its residual leaves."""
     rows: list[Row] = [("event", *_head_columns(units), "at")]
     for event in branch.events:
-        found = {**event.parameters, "abscissa": float(branch.abscissa[event.index])}
-        # a point may be off by some times the residual of its coefficients: two digits less than that
-        digits = min(max(math.floor(-math.log10(max(event.residual, _ROUNDING))) - 2, 2), ALL)
-        rows.append((name_kind(model, event.name), *_list_numbers(found, units, digits), event.detail))
+        values = {**event.parameters, "abscissa": float(branch.abscissa[event.index])}
+        # the error of a point may be several times the residual of its coefficients: show two digits less
+        digits = min(max(math.floor(-math.log10(max(event.residual, _ROUNDING_MISMATCH))) - 2, 2), ALL_DIGITS)
+        rows.append((name_kind(model, event.name), *_list_numbers(values, units, digits), event.detail))
     return rows
 
 
 def name_kind(model: Model | None, name: str) -> str:
-    """A kind of boundary, or an event, in the words of a model where that is known."""
+    """Name a kind of boundary or an event, in the words of the model if it is given."""
     return in_words_of(model, name) if model else name
 
 
@@ -98,41 +98,41 @@ def _head_columns(units: Mapping[str, Unit]) -> Iterator[str]:
     return (f"{n} {unit.text}".rstrip() for n, unit in units.items())
 
 
-def _list_numbers(values: Mapping[str, float], units: Mapping[str, Unit], digits: int = ALL) -> Iterator[Cell]:
+def _list_numbers(values: Mapping[str, float], units: Mapping[str, Unit], digits: int = ALL_DIGITS) -> Iterator[Cell]:
     return (Cell(values[n], unit, digits) for n, unit in units.items())
 
 
 def _tabulate_points(trace: Trace) -> Parts:
-    """Points of all branches with their events, in the units of the problem."""
+    """Tabulate points of all branches with their events, in the units of the problem."""
     units = {n: unit_of(trace.problem.posed, n) for n in (*trace.problem.free, "abscissa")}
     model = trace.problem.model
     swings = () if model.carrier is not None else ("heavily damped",)
     facts = ("kind", "stable", *swings, "constraints", "event")
     records = [*trace.records()]
     marked = [k for k, record in enumerate(records) if record["event"]]
-    kept, note = thin_rows(records, "points", "tmsopt trace FILE --csv curve.csv writes all", marked)
+    shown_records, note = thin_rows(records, "points", "tmsopt trace FILE --csv curve.csv writes all", marked)
     rows: list[Row] = [("branch", *_head_columns(units), *facts)]
-    for record in kept:
-        said = (in_words_of(model, format_value(record[fact.replace(" ", "_")])) for fact in facts)
-        rows.append((str(record["branch"] + 1), *_list_numbers(record, units, _SHORT), *said))
+    for record in shown_records:
+        cells = (in_words_of(model, format_value(record[fact.replace(" ", "_")])) for fact in facts)
+        rows.append((str(record["branch"] + 1), *_list_numbers(record, units, _POINT_DIGITS), *cells))
     yield Chapter("rows", "Points", "whole")
     yield from note
     yield TableBlock(rows, "Points of the branches")
 
 
 def write_branch(branch: Branch, _level: Level) -> Parts:
-    """One branch with its events, in the free parameters."""
+    """Write one branch with its events, in the free parameters."""
     form = "closed" if branch.closed else "open"
     yield branch.pattern, count_things(branch, "point"), count_things(branch.events, "event"), form
-    found = f"{branch.pattern}: {len(branch)} points, {form}, coefficient error {branch.residual:.0e}"
-    yield Sentence(found, tone="answer")
+    text = f"{branch.pattern}: {len(branch)} points, {form}, coefficient error {branch.residual:.0e}"
+    yield Sentence(text, tone="answer")
     yield Chapter("events")
     units = dict.fromkeys((*branch.tangent, "abscissa"), Unit())
     yield TableBlock(list_events(branch, units), "Events along the branch")
 
 
 def write_domain(domain: Domain, _level: Level) -> Parts:
-    """What bounds stability and heavy damping, and the corners."""
+    """Write the boundaries of stability and of heavy damping, and their corners."""
     stability, damping = (count_things(arcs, "arc") for arcs in (domain.stability, domain.heavy_damping))
     yield f"stability: {stability}", f"heavy damping: {damping}", count_things(domain.corners, "corner")
     yield from describe_domain(domain)
@@ -141,10 +141,10 @@ def write_domain(domain: Domain, _level: Level) -> Parts:
 
 
 def describe_domain(domain: Domain, problem: Posed | None = None) -> Iterator[str]:
-    """What bounds stability and heavy damping."""
+    """Describe the boundaries of stability and of heavy damping."""
     model = problem.model if problem else None
     bounded = [("stability", domain.stability)]
-    if model is None or model.carrier is None:  # eigenfrequencies of H have no axis on which nothing swings
+    if model is None or model.carrier is None:  # a complex system has no heavy damping
         bounded.append(("heavy damping", domain.heavy_damping))
     for name, arcs in bounded:
         points: dict[str, list[int]] = {}
@@ -158,7 +158,7 @@ def describe_domain(domain: Domain, problem: Posed | None = None) -> Iterator[st
 
 
 def tabulate_corners(domain: Domain, problem: Posed | None = None) -> Iterator[TableBlock]:
-    """Each corner to all digits, in the units of the problem where it is known; nothing without corners."""
+    """Tabulate the corners to all digits, in the units of the problem if it is given; yield nothing without corners."""
     if not domain.corners:
         return
     model = problem.model if problem else None
@@ -168,27 +168,27 @@ def tabulate_corners(domain: Domain, problem: Posed | None = None) -> Iterator[T
     yield TableBlock((("corner", *_head_columns(units)), *rows), "Corners of the domains")
 
 
-def write_swallowtail(found: Swallowtail, _level: Level) -> Parts:
-    """Pieces of the surface, then its edges as traces."""
-    edges = f"edges: {count_things(found.cusps.branches, 'EP3 curve')}"
-    yield " ".join(found.axes), count_things(found.patches, "patch", "patches"), edges
-    damped = sum(patch.heavily_damped for patch in found.patches)
-    pieces = f"{len(found.patches)} patches, {damped} of them bound heavy damping"
-    yield Sentence(f"real negative double roots over {', '.join(found.axes)}: {pieces}", tone="answer")
-    yield Sentence(describe_trace(found.cusps), "cuspidal edges")
-    yield Sentence(describe_trace(found.crossing), "self-intersection")
+def write_swallowtail(swallowtail: Swallowtail, _level: Level) -> Parts:
+    """Write the patches of the surface, then its edges as traces."""
+    edges = f"edges: {count_things(swallowtail.cusps.branches, 'EP3 curve')}"
+    yield " ".join(swallowtail.axes), count_things(swallowtail.patches, "patch", "patches"), edges
+    damped = sum(patch.heavily_damped for patch in swallowtail.patches)
+    pieces = f"{len(swallowtail.patches)} patches, {damped} of them bound heavy damping"
+    yield Sentence(f"real negative double roots over {', '.join(swallowtail.axes)}: {pieces}", tone="answer")
+    yield Sentence(describe_trace(swallowtail.cusps), "cuspidal edges")
+    yield Sentence(describe_trace(swallowtail.crossing), "self-intersection")
 
 
 def write_chart(chart: Chart, level: Level) -> Parts:
-    """The classes with their shares, the best grid point, the boundaries of a plane in memory, and their corners."""
-    size, over = " × ".join(str(len(values)) for values in chart.grid), ", ".join(chart.axes)
-    most = sorted(chart.shares.items(), key=lambda item: -item[1])[:2]
-    yield f"{size} designs over {over}", *(f"{100 * share:.3g} % {name}" for name, share in most)
+    """Write the classes with their shares, the best grid point, and the boundaries with their corners."""
+    size, axis_names = " × ".join(str(len(values)) for values in chart.grid), ", ".join(chart.axes)
+    largest_shares = sorted(chart.shares.items(), key=lambda item: -item[1])[:2]
+    yield f"{size} designs over {axis_names}", *(f"{100 * share:.3g} % {name}" for name, share in largest_shares)
     data: dict[str, Any] = chart.to_json()
     problem = chart.problem.posed
     plane = chart.path is None and len(chart.axes) == 2
-    over = " and ".join(chart.axes) if plane else over
-    yield Sentence(f"{size} designs over {over}", tone="answer")
+    axis_names = " and ".join(chart.axes) if plane else axis_names
+    yield Sentence(f"{size} designs over {axis_names}", tone="answer")
     yield Chapter("classes")
     yield from _write_classes(chart, data, plane)
     yield Chapter("best")
@@ -205,9 +205,9 @@ def write_chart(chart: Chart, level: Level) -> Parts:
         yield f"{data['per_second']:.3g} designs per second with {data['engine']}"
     if level == "page":
         yield Chapter("picture", "Chart", "wide")
-        shown, axes = _thin_chart(chart, _POINTS), " and ".join(chart.axes)
-        yield Figure(plots.chart_figure, shown, f"Stability over {axes}")
-        yield Figure(partial(plots.chart_figure, layer="abscissa"), shown, f"Spectral abscissa over {axes}")
+        thinned, axes = _thin_chart(chart, _MAX_PICTURE_POINTS), " and ".join(chart.axes)
+        yield Figure(plots.chart_figure, thinned, f"Stability over {axes}")
+        yield Figure(partial(plots.chart_figure, layer="abscissa"), thinned, f"Spectral abscissa over {axes}")
         yield from write_question(problem)
         yield from _tabulate_designs(chart)
 
@@ -221,16 +221,16 @@ def _write_classes(chart: Chart, data: Mapping[str, Any], plane: bool) -> Parts:
     if satisfied is not None and inequalities:
         yield f"the constraints hold on {100 * satisfied:.2f} %"
     for name in chart.left_aside if plane else ():
-        yield f"{name} is an equality, which holds on curves and not on a grid: left aside"
+        yield f"{name} is an equality, which holds on curves and not on a grid: ignored"
 
 
 def _tabulate_designs(chart: Chart) -> Parts:
-    """Designs of the grid, every so many along each axis where they are too many."""
-    problem, shown = chart.problem, _thin_chart(chart, MOST)
+    """Tabulate the designs of the grid; if there are too many, every k-th one along each axis."""
+    problem, thinned = chart.problem, _thin_chart(chart, MAX_ROWS)
     left_out = [] if len(problem.constraints) > len(chart.left_aside) else ["satisfied", "margin"]
-    left_out += [] if problem.model.carrier is None else ["damping_ratio", "real_roots"]  # eigenfrequencies have none
-    grid = reversed(np.meshgrid(*reversed(shown.grid), indexing="ij"))
-    layers = {n: layer for n, layer in shown.layers.items() if n not in left_out}
+    left_out += [] if problem.model.carrier is None else ["damping_ratio", "real_roots"]  # a complex system has neither
+    grid = reversed(np.meshgrid(*reversed(thinned.grid), indexing="ij"))
+    layers = {n: layer for n, layer in thinned.layers.items() if n not in left_out}
     columns: dict[str, list[Cell | str]] = {}
     for name, layer in (*zip(chart.axes, grid, strict=True), *layers.items()):
         values = np.asarray(layer).ravel().tolist()
@@ -243,16 +243,16 @@ def _tabulate_designs(chart: Chart) -> Parts:
             columns[name.replace("_", " ")] = [format_value(x) for x in values]
     yield Chapter("rows", "Designs", "whole")
     rows = [tuple(columns), *zip(*columns.values(), strict=True)]
-    left = math.prod(map(len, chart.grid))
-    if len(rows) <= left:
-        yield f"{len(rows) - 1} of {left} designs, spread evenly over each axis; --output writes all."
+    count = math.prod(map(len, chart.grid))
+    if len(rows) <= count:
+        yield f"{len(rows) - 1} of {count} designs, spread evenly over each axis; --output writes all."
     yield TableBlock(rows, "Designs of the grid")
 
 
-def _thin_chart(chart: Chart, most: int) -> Chart:
-    """A chart with one in so many designs along each axis that there are no more than `most`."""
+def _thin_chart(chart: Chart, max_designs: int) -> Chart:
+    """Keep every k-th grid point along each axis, so that at most `max_designs` remain."""
     sizes = [len(values) for values in chart.grid]
-    step = next(k for k in range(1, max(sizes) + 1) if math.prod(-(-size // k) for size in sizes) <= most)
+    step = next(k for k in range(1, max(sizes) + 1) if math.prod(-(-size // k) for size in sizes) <= max_designs)
     if step == 1:
         return chart
     layers = {n: layer[(slice(None, None, step),) * len(sizes)] for n, layer in chart.layers.items()}

@@ -1,4 +1,4 @@
-"""What a model is made of, or a problem: signs, what is asked, symbols, patterns, functions."""
+"""Documents of descriptions: what a model or a problem consists of."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -17,52 +17,56 @@ from tmsopt.guide import Description, Word as Symbol
 from tmsopt.models.expression import COMPARISONS
 
 
-def write_description(found: Description, level: Level) -> Parts:
-    """The model, its signs, what is asked, symbols, patterns and functions, each under its name."""
-    sizes = " or ".join(count_things(of.parameters, "parameter") for of in found.sets)
-    yield found.model, f"degree {found.degree}", sizes
-    about = f"{found.model}: {found.meaning}, degree {found.degree}" if found.meaning != found.model else found.model
+def write_description(description: Description, level: Level) -> Parts:
+    """Write the model, its sign conventions, the question, symbols, patterns and functions, each under a heading."""
+    sizes = " or ".join(count_things(parameter_set.parameters, "parameter") for parameter_set in description.sets)
+    yield description.model, f"degree {description.degree}", sizes
+    about = description.model
+    if description.meaning != description.model:
+        about += f": {description.meaning}, degree {description.degree}"
     yield Sentence(about, tone="answer")
-    if found.omits:
-        yield f"the model is {found.omits}"
-    if found.sketch:
+    if description.omits:
+        yield f"the model is {description.omits}"
+    if description.sketch:
         yield Chapter("sketch")
-        yield Verbatim(found.sketch.strip("\n"), "sketch of the model, not to scale")
-    for number, (title, blocks) in enumerate(_write_parts(found)):
+        yield Verbatim(description.sketch.strip("\n"), "sketch of the model, not to scale")
+    for number, (title, blocks) in enumerate(_write_parts(description)):
         yield Chapter(f"part-{number}", title.capitalize(), "wide")
         if level == "brief":
             yield Sentence(title, tone="answer")
         yield from blocks
 
 
-def _write_parts(found: Description) -> Iterator[tuple[str, Iterable[Block | str]]]:
-    if found.conventions:
-        yield "signs", found.conventions
-    if found.matrices:
-        yield "matrices", [Verbatim(_format_matrix(n, rows), n) for n, rows in found.matrices.items()]
-    for section, keys in found.asked.items():
+def _write_parts(description: Description) -> Iterator[tuple[str, Iterable[Block | str]]]:
+    if description.conventions:
+        yield "signs", description.conventions
+    if description.matrices:
+        yield "matrices", [Verbatim(_format_matrix(n, rows), n) for n, rows in description.matrices.items()]
+    for section, keys in description.asked.items():
         yield section, [Listing(tuple(keys.items()))]
-    shown = {p.name for of in found.sets for p in of.parameters}  # a quantity of one set may be a parameter of another
-    for of in found.sets:
-        alone = "" if of.name == "stated" else f", {of.name}"
-        yield f"parameters{alone}", [_tabulate_symbols(of.parameters)]
-        new = [q for q in of.quantities if q.name not in shown]
-        shown |= {q.name for q in new}
-        yield f"quantities{alone}", [_tabulate_symbols(new)]
-    for of in found.feedback:
-        yield f"[feedback], {of.name}", [_tabulate_symbols((*of.parameters, *of.quantities))]
-    roots = "eigenfrequencies" if "H" in found.matrices else "roots"
-    yield f"patterns of {roots}, for locate", [Listing(tuple(found.patterns.items()))]
-    yield "expressions", [f"+ - * / **   {' '.join(COMPARISONS.values())}   {' '.join(found.functions)}"]
+    # a quantity of one set may be a parameter of another
+    names = {p.name for parameter_set in description.sets for p in parameter_set.parameters}
+    for parameter_set in description.sets:
+        suffix = "" if parameter_set.name == "stated" else f", {parameter_set.name}"
+        yield f"parameters{suffix}", [_tabulate_symbols(parameter_set.parameters)]
+        new_quantities = [q for q in parameter_set.quantities if q.name not in names]
+        names |= {q.name for q in new_quantities}
+        yield f"quantities{suffix}", [_tabulate_symbols(new_quantities)]
+    for parameter_set in description.feedback:
+        symbols = (*parameter_set.parameters, *parameter_set.quantities)
+        yield f"[feedback], {parameter_set.name}", [_tabulate_symbols(symbols)]
+    roots = "eigenfrequencies" if "H" in description.matrices else "roots"
+    yield f"patterns of {roots}, for locate", [Listing(tuple(description.patterns.items()))]
+    yield "expressions", [f"+ - * / **   {' '.join(COMPARISONS.values())}   {' '.join(description.functions)}"]
 
 
-def _tabulate_symbols(listed: Iterable[Symbol]) -> Block | str:
-    rows = [(w.name, "" if w.unit == "1" else w.unit, w.given, w.range, w.meaning) for w in listed]
+def _tabulate_symbols(symbols: Iterable[Symbol]) -> Block | str:
+    rows = [(w.name, "" if w.unit == "1" else w.unit, w.given, w.range, w.meaning) for w in symbols]
     return TableBlock((("",) * 5, *rows)) if rows else "none"
 
 
 def _format_matrix(name: str, rows: Sequence[Sequence[str]]) -> str:
-    """Columns under each other."""
+    """Write a matrix with aligned columns."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lead = f"{name} = "
     return "\n".join(

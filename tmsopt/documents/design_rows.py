@@ -1,13 +1,13 @@
-"""Tables and lines of the report of a design: parameters, quantities, motion, roots, loads.
+"""Tables and lines of a solution's report: parameters, quantities, motion, roots, loads.
 
-A model that is dimensionless and in SI has the number of the other set next to each.
+Some models have two parameter sets, dimensionless and in SI. The report then shows each number also in the other set.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tmsopt.documents.blocks import ALL, Cell, Row, TableBlock
+from tmsopt.documents.blocks import ALL_DIGITS, Cell, Row, TableBlock
 from tmsopt.dynamics.speeds import speed_of
 from tmsopt.evaluation.recheck import FEASIBLE
 from tmsopt.guide import describe
@@ -22,63 +22,63 @@ from tmsopt.records import Numbers
 from tmsopt.roots import Root
 
 BRIEF = 5
-"""Digits of a number in a brief report."""
-NOTHING = 1e-14
-"""Share of the size of a root, or of 1: less is rounding."""
-_OF_RANGE = 1e-12  # share of a range: less is rounding
+"""Significant digits of a number in a brief report."""
+ZERO_SHARE = 1e-14
+"""A number below this share of its scale (the size of a root, or 1) is only rounding and is shown as 0."""
+_RANGE_ROUNDING = 1e-12  # a value below this share of the length of its range is only rounding and is shown as 0
 PERCENT = Unit("%", 0.01)
 
 
 def convert_to_si(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float = GRAVITY) -> Numbers:
-    """SI parameters: as solved for, or of dimensionless skates for the given wheelbase, rear mass and gravity."""
-    own = solution.problem.posed.parameter_set.rate is not None or len(solution.problem.model.sets) == 1
-    return solution.parameters if own else to_si(solution.dimensionless, w, m_B, g)
+    """Convert dimensionless parameters to SI for a wheelbase, rear mass and gravity; SI parameters stay unchanged."""
+    needs_no_conversion = solution.problem.posed.parameter_set.rate is not None or len(solution.problem.model.sets) == 1
+    return solution.parameters if needs_no_conversion else to_si(solution.dimensionless, w, m_B, g)
 
 
 def list_parameters(solution: Solution, si: Numbers, brief: bool = False) -> Iterator[tuple[str, Cell, str, str, str]]:
-    """Name, number, role, what it is in the other set, and meaning of each parameter.
+    """List name, number, role, value in the other set, and meaning of each parameter.
 
-    Parameters that are 0 by default are left out.
+    Fixed parameters that are 0 by default are left out.
 
     Args:
-        si: the parameters in SI; of a model without a dimensionless form those of the solution.
-        brief: with few digits, each number with its unit.
+        si: the parameters in SI; for a model with only one set, the parameters of the solution.
+        brief: whether numbers have few digits and their units.
     """
-    problem, digits = solution.problem.posed, BRIEF if brief else ALL
-    others = [s for s in problem.model.sets if s is not problem.parameter_set]
+    problem, digits = solution.problem.posed, BRIEF if brief else ALL_DIGITS
+    other_sets = [s for s in problem.model.sets if s is not problem.parameter_set]
     for p in problem.parameter_set.parameters:
         x, (lower, upper) = solution.parameters[p.name], problem.free.get(p.name, (0.0, 0.0))
-        x = 0.0 if abs(x) <= _OF_RANGE * (upper - lower) else x
+        x = 0.0 if abs(x) <= _RANGE_ROUNDING * (upper - lower) else x
         role = "free" if p.name in problem.free else "scenario" if p.name in problem.scenarios else "fixed"
         if role == "fixed" and x == 0 == p.default:
             continue
-        also = ""
-        for other in others:
-            values = solution.dimensionless if other.rate is None else si
-            for q in other.parameters if p.name not in other.names else ():
+        counterpart = ""
+        for other_set in other_sets:
+            values = solution.dimensionless if other_set.rate is None else si
+            for q in other_set.parameters if p.name not in other_set.names else ():
                 if p.counterpart == q.name or q.counterpart == p.name:
-                    also = also or _describe_twin(q, values[q.name], digits)
+                    counterpart = counterpart or _describe_twin(q, values[q.name], digits)
         meaning = "" if p.meaning == "parameter" else p.meaning
-        yield p.name, Cell(x, unit_of(problem, p.name), digits, named=brief), role, also, meaning
+        yield p.name, Cell(x, unit_of(problem, p.name), digits, with_unit=brief), role, counterpart, meaning
 
 
 def tabulate_parameters(solution: Solution, si: Numbers) -> TableBlock:
-    """Every parameter with its role, its range, what it is in the other set, and its meaning."""
-    ranges = {w.name: w.given for of in describe(solution).sets for w in of.parameters}
-    other = "without units" if solution.problem.posed.parameter_set.rate is not None else "in SI"
-    rows: list[Row] = [("parameter", "value", "unit", "free or fixed", "range", other, "meaning")]
-    for name, cell, role, also, meaning in list_parameters(solution, si):
-        rows.append((name, cell, cell.unit.text, role, ranges[name] if role == "free" else "", also, meaning))
+    """Tabulate every parameter with its role, range, value in the other set, and meaning."""
+    ranges = {w.name: w.given for parameter_set in describe(solution).sets for w in parameter_set.parameters}
+    other_form = "without units" if solution.problem.posed.parameter_set.rate is not None else "in SI"
+    rows: list[Row] = [("parameter", "value", "unit", "free or fixed", "range", other_form, "meaning")]
+    for name, cell, role, counterpart, meaning in list_parameters(solution, si):
+        rows.append((name, cell, cell.unit.text, role, ranges[name] if role == "free" else "", counterpart, meaning))
     return TableBlock(rows, "Parameters of the design")
 
 
 def list_quantities(solution: Solution, si: Numbers) -> Iterator[Row]:
-    """Name, number, unit, the same in SI for a dimensionless one, and meaning of each quantity that exists."""
+    """List name, number, unit, value in SI if the number is dimensionless, and meaning of each finite quantity."""
     problem = solution.problem.posed
-    of = problem.parameter_set
-    scaled = next((s for s in problem.model.sets if s.rate is not None and s is not of), None)
-    values = None if scaled is None else Values(problem.model, scaled, si)
-    for q in (*problem.model.quantities, *of.quantities):
+    parameter_set = problem.parameter_set
+    si_set = next((s for s in problem.model.sets if s.rate is not None and s is not parameter_set), None)
+    values = None if si_set is None else Values(problem.model, si_set, si)
+    for q in (*problem.model.quantities, *parameter_set.quantities):
         x = float(solution.quantities.get(q.name, math.nan))
         if not math.isfinite(x) or q.aside:
             continue
@@ -86,51 +86,53 @@ def list_quantities(solution: Solution, si: Numbers) -> Iterator[Row]:
         if q.share:
             cell = Cell(x if abs(x) > FEASIBLE else 0.0, PERCENT, 6)
         twin = q.counterpart
-        also = "" if twin is None or values is None else _describe_twin(twin, float(twin.value(values)))
-        yield q.name, cell, cell.unit.text, also, q.meaning
+        counterpart = "" if twin is None or values is None else _describe_twin(twin, float(twin.value(values)))
+        yield q.name, cell, cell.unit.text, counterpart, q.meaning
 
 
 def list_cases(solution: Solution) -> list[Case]:
-    """The cases that the problem states, and the extreme ones that were found."""
-    stated = [case for case in solution.problem.posed.cases if not case.direction]
-    return stated + [case for case in (solution.worst, solution.least_damped, solution.fastest) if case is not None]
+    """List the cases that the problem states, and the extreme cases that the solver found."""
+    stated_cases = [case for case in solution.problem.posed.cases if not case.direction]
+    return stated_cases + [
+        case for case in (solution.worst, solution.least_damped, solution.fastest) if case is not None
+    ]
 
 
 def parameters_of_worst_case(solution: Solution) -> Numbers:
-    """The parameters in the case that roots and abscissa belong to: of a band the worst one, else the design's own."""
+    """Return the parameters that roots and abscissa belong to: those of the worst case, if there are cases."""
     return solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
 
 
 def describe_motion(solution: Solution) -> str:
-    """How fast a disturbance dies out or grows, and at which frequencies it swings."""
+    """Describe how fast a disturbance dies out or grows, and at which frequencies it oscillates."""
     rate, time, hertz = _time_units(solution)
     abscissa = solution.abscissa * rate
     if solution.stable is None:
         return "no motion to describe: a root is at infinity"
-    found = solution.stability
-    growth = f"grows as {found.growth}{'' if solution.edge_is_exact else ROUNDED}"
-    lasts = growth if found.growth else "neither decay nor growth"
-    if not found.on_edge:
-        lasts = f"{'decay' if abscissa < 0 else 'growth'} time {time.show(1 / abs(abscissa), 4)}"
+    stability = solution.stability
+    growth = f"grows as {stability.growth}{'' if solution.edge_is_exact else ROUNDED}"
+    decay_text = growth if stability.growth else "neither decay nor growth"
+    if not stability.on_edge:
+        decay_text = f"{'decay' if abscissa < 0 else 'growth'} time {time.show(1 / abs(abscissa), 4)}"
     if solution.problem.model.carrier is not None:
-        edge = growth if found.growth else "neither loss nor gain"
-        gain = f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({lasts})"
-        real = _name_real(solution) if found.on_edge or solution.beyond_axis else ""
-        return f"{edge if found.on_edge else gain}{real}"
-    swings = [f for f in frequencies(solution.roots, rate) if f * 2 * math.pi > 1e-9 * rate]
-    if not swings:
-        return f"{lasts}; no oscillation"
-    turn, angular = (1.0, "") if hertz.text == "Hz" else (2 * math.pi, "angular ")
-    name = angular + ("frequency" if len(swings) == 1 else "frequencies")
-    listed = " and ".join(f"{turn * f:.4g}" for f in dict.fromkeys(swings))
-    ratio, least = solution.quantities["damping_ratio"], describe_speed(solution, solution.least_damped)
-    at = f" at {least}" if least and least != describe_speed(solution, solution.worst) else ""
-    damping = f"damping ratio {ratio if abs(ratio) > NOTHING else 0:.4g}{at}"
-    return f"{lasts}; {name} {listed} {hertz.text}".rstrip() + f"; {damping}"
+        edge = growth if stability.growth else "neither loss nor gain"
+        gain = f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({decay_text})"
+        real = _name_real(solution) if stability.on_edge or solution.beyond_axis else ""
+        return f"{edge if stability.on_edge else gain}{real}"
+    oscillations = [f for f in frequencies(solution.roots, rate) if f * 2 * math.pi > 1e-9 * rate]
+    if not oscillations:
+        return f"{decay_text}; no oscillation"
+    factor, prefix = (1.0, "") if hertz.text == "Hz" else (2 * math.pi, "angular ")
+    name = prefix + ("frequency" if len(oscillations) == 1 else "frequencies")
+    values = " and ".join(f"{factor * f:.4g}" for f in dict.fromkeys(oscillations))
+    ratio, damped_speed = solution.quantities["damping_ratio"], describe_speed(solution, solution.least_damped)
+    at = f" at {damped_speed}" if damped_speed and damped_speed != describe_speed(solution, solution.worst) else ""
+    damping = f"damping ratio {ratio if abs(ratio) > ZERO_SHARE else 0:.4g}{at}"
+    return f"{decay_text}; {name} {values} {hertz.text}".rstrip() + f"; {damping}"
 
 
 def describe_speed(solution: Solution, case: Case | None) -> str:
-    """The speed of a case, where speeds differ from case to case; else empty."""
+    """Write the speed of a case; empty unless the cases have different speeds."""
     name = speed_of(solution.problem.posed.parameter_set)
     if name is None or case is None or name not in {**case.at, **case.offset}:
         return ""
@@ -138,48 +140,48 @@ def describe_speed(solution: Solution, case: Case | None) -> str:
 
 
 def describe_loads(solution: Solution) -> str:
-    """What each wheel carries."""
-    found, problem = solution.quantities, solution.problem.posed
+    """Describe the load on each wheel."""
+    quantities, problem = solution.quantities, solution.problem.posed
     parts = []
     for wheel, share, load in (("front", "load_front", "N_F"), ("rear", "load_rear", "N_R")):
-        lifts = abs(found[share]) <= FEASIBLE
-        percent = f"{0.0 if lifts else 100 * found[share]:.4g} %"
-        if math.isfinite(newtons := found.get(load, math.nan)):
-            percent = f"{unit_of(problem, load).show(0.0 if lifts else newtons, 4)} ({percent})"
+        is_lifted = abs(quantities[share]) <= FEASIBLE
+        percent = f"{0.0 if is_lifted else 100 * quantities[share]:.4g} %"
+        if math.isfinite(newtons := quantities.get(load, math.nan)):
+            percent = f"{unit_of(problem, load).show(0.0 if is_lifted else newtons, 4)} ({percent})"
         parts.append(f"{wheel} wheel {percent}")
     return ", ".join(parts)
 
 
 def describe_pitching(solution: Solution) -> str:
-    """Whether the bicycle pitches over, in any of its cases, and the ballast that prevents it."""
-    listed = list_cases(solution)
-    each: list[Mapping[str, Any]] = [
-        solution.problem.posed.values(case.applied(solution.parameters)) for case in listed
+    """Describe whether the bicycle pitches over in any case, and which ballast prevents it."""
+    cases = list_cases(solution)
+    case_values: list[Mapping[str, Any]] = [
+        solution.problem.posed.values(case.applied(solution.parameters)) for case in cases
     ]
-    each = each or [solution.quantities]
-    in_case = " in the worst case" if listed else ""
-    for lifted, over in (("rear", "front"), ("front", "rear")):
-        load = min(float(case[f"load_{lifted}"]) for case in each)
-        if abs(load) <= FEASIBLE:  # a limit chi_T <= 1 that is active is met within this
-            return f"on the verge of pitching over the {over} wheel{in_case}; the {lifted} wheel carries no load"
+    case_values = case_values or [solution.quantities]
+    in_case = " in the worst case" if cases else ""
+    for wheel, pivot in (("rear", "front"), ("front", "rear")):
+        load = min(float(case[f"load_{wheel}"]) for case in case_values)
+        if abs(load) <= FEASIBLE:  # the tolerance of an active limit chi_T <= 1
+            return f"on the verge of pitching over the {pivot} wheel{in_case}; the {wheel} wheel carries no load"
         if load < 0:
-            return f"pitches over the {over} wheel{in_case}{_describe_ballast(solution, each, lifted)}"
-    return "on both wheels in every case listed" if listed else "stands on both wheels"
+            return f"pitches over the {pivot} wheel{in_case}{_describe_ballast(solution, case_values, wheel)}"
+    return "on both wheels in every case listed" if cases else "stands on both wheels"
 
 
-def _describe_ballast(solution: Solution, each: Sequence[Mapping[str, Any]], lifted: str) -> str:
-    """The ballast at a wheel's contact that has no part in the lateral motion: with trail, at the rear one alone."""
+def _describe_ballast(solution: Solution, case_values: Sequence[Mapping[str, Any]], wheel: str) -> str:
+    """Describe the ballast at a contact point that does not change the lateral motion; with trail, only at the rear."""
     problem = solution.problem.posed
-    units = {f"m_ballast_{lifted}": unit_of(problem, "m_B"), f"ballast_{lifted}": Unit("m_B")}
+    units = {f"m_ballast_{wheel}": unit_of(problem, "m_B"), f"ballast_{wheel}": Unit("m_B")}
     for name, unit in units.items():
         if name in problem.vocabulary:
-            needed = unit.show(max(float(values[name]) for values in each), 4)
-            return f"; ballast of {needed} at the {lifted} contact prevents this and does not change lean and steer"
+            needed = unit.show(max(float(values[name]) for values in case_values), 4)
+            return f"; ballast of {needed} at the {wheel} contact prevents this and does not change lean and steer"
     return ""
 
 
 def describe_inertia(solution: Solution) -> str:
-    """How much of each moment of inertia a stable design of point masses bears, also as a radius of gyration √(I/m)."""
+    """List the largest moments of inertia for which the design stays stable, also as radii of gyration √(I/m)."""
     length, parts = unit_of(solution.problem.posed, "w"), []
     for name, inertia in (solution.inertia_margin or {}).items():
         radius = "" if inertia is None else length.show(math.sqrt(inertia / solution.parameters[INERTIAS[name]]), 3)
@@ -188,84 +190,89 @@ def describe_inertia(solution: Solution) -> str:
 
 
 def describe_roots(solution: Solution, digits: int) -> tuple[str, str]:
-    """A label, and the roots, or of a complex system its eigenfrequencies."""
+    """Return a label and a text: the roots, or the eigenfrequencies of a complex system."""
     if solution.problem.model.carrier is None:
         problem = solution.problem.posed
-        unit, own = unit_at(problem, "abscissa", parameters_of_worst_case(solution)), unit_of(problem, "abscissa")
-        named = f"  in {unit.text}" if unit.text else ""
-        named += f"; √(g/w) = {1 / unit.one:.{digits}g} {unit.text}" if unit != own else ""
-        return "roots", (", ".join(format_roots(solution.roots, digits, 1 / unit.one)) or "none") + named
-    each, least = solution.eigenfrequencies, NOTHING * abs(solution.problem.model.carrier)
-    middle = sum(z.re for z in each) / len(each) if each else 0.0
-    spread = max((math.hypot(z.re - middle, z.im) for z in each), default=0.0) or 1.0
-    digits = min(digits + max(0, math.ceil(math.log10(max(abs(middle), spread) / spread))), ALL)
-    return "eigenfrequencies", ", ".join(format_frequency(z.re, z.im, digits, z.multiplicity, least) for z in each)
+        unit = unit_at(problem, "abscissa", parameters_of_worst_case(solution))
+        unit_text = f"  in {unit.text}" if unit.text else ""
+        unit_text += f"; √(g/w) = {1 / unit.one:.{digits}g} {unit.text}" if unit != unit_of(problem, "abscissa") else ""
+        return "roots", (", ".join(format_roots(solution.roots, digits, 1 / unit.one)) or "none") + unit_text
+    omegas, threshold = solution.eigenfrequencies, ZERO_SHARE * abs(solution.problem.model.carrier)
+    middle = sum(z.re for z in omegas) / len(omegas) if omegas else 0.0
+    spread = max((math.hypot(z.re - middle, z.im) for z in omegas), default=0.0) or 1.0
+    digits = min(digits + max(0, math.ceil(math.log10(max(abs(middle), spread) / spread))), ALL_DIGITS)
+    return "eigenfrequencies", ", ".join(
+        format_frequency(z.re, z.im, digits, z.multiplicity, threshold) for z in omegas
+    )
 
 
-def format_root(root: Any, digits: int, multiplicity: int = 1, least: float = 0.0) -> str:
-    """The eigenfrequency of a record that has one, else its root or pair of roots."""
+def format_root(root: Any, digits: int, multiplicity: int = 1, threshold: float = 0.0) -> str:
+    """Write the eigenfrequency of a record if it has one, otherwise its root or pair of roots."""
     if (omega := root.eigenfrequency) is not None:
-        return format_frequency(omega.real, omega.imag, digits, multiplicity, least)
-    return format_pair(root.re, root.im, digits, multiplicity, least)
+        return format_frequency(omega.real, omega.imag, digits, multiplicity, threshold)
+    return format_pair(root.re, root.im, digits, multiplicity, threshold)
 
 
-def format_frequency(re: float, im: float, digits: int, multiplicity: int = 1, least: float = 0.0) -> str:
-    """An eigenfrequency as text; a part that is only rounding, or at most the least, is 0."""
-    re, im = _drop_noise(re, im, least)
+def format_frequency(re: float, im: float, digits: int, multiplicity: int = 1, threshold: float = 0.0) -> str:
+    """Write an eigenfrequency; a part that is only rounding, or at most the threshold, is 0."""
+    re, im = _drop_noise(re, im, threshold)
     value = f"{im:.{digits}g}i" if im and not re else f"{re:.{digits}g}"
     value += f" {'-' if im < 0 else '+'} {abs(im):.{digits}g}i" if re and im else ""
     return value + format_multiplicity(multiplicity)
 
 
-def format_pair(re: float, im: float, digits: int, multiplicity: int = 1, least: float = 0.0) -> str:
-    """A root, or a pair of roots, as text; a part that is only rounding, or at most the least, is 0."""
-    re, im = _drop_noise(re, im, least)
+def format_pair(re: float, im: float, digits: int, multiplicity: int = 1, threshold: float = 0.0) -> str:
+    """Write a root or a pair of roots; a part that is only rounding, or at most the threshold, is 0."""
+    re, im = _drop_noise(re, im, threshold)
     return f"{re:.{digits}g}" + (f" ± {im:.{digits}g}i" if im else "") + format_multiplicity(multiplicity)
 
 
-def _drop_noise(re: float, im: float, least: float) -> tuple[float, float]:
-    least = max(least, NOTHING * math.hypot(re, im))
-    return re if abs(re) > least else 0.0, im if abs(im) > least else 0.0
+def _drop_noise(re: float, im: float, threshold: float) -> tuple[float, float]:
+    threshold = max(threshold, ZERO_SHARE * math.hypot(re, im))
+    return re if abs(re) > threshold else 0.0, im if abs(im) > threshold else 0.0
 
 
 def format_roots(roots: Sequence[Root], digits: int = 8, rate: float = 1.0) -> list[str]:
-    """Roots as text, times a rate, a conjugate pair as one entry."""
+    """Write the roots multiplied by a rate; a conjugate pair is one entry."""
     return [format_pair(r.re * rate, r.im * rate, digits, r.multiplicity) for r in roots if r.im >= 0]
 
 
 def format_multiplicity(multiplicity: int) -> str:
-    """The multiplicity of a root, behind its value; nothing of a simple one."""
+    """Write the multiplicity that follows the value of a root; empty for a simple root."""
     return f" ({multiplicity}-fold)" if multiplicity > 1 else ""
 
 
 def describe_stored(solution: Solution) -> Iterator[str]:
-    """To all digits: the abscissa, and that of the numbers as they are stored."""
-    problem, at = solution.problem.posed, parameters_of_worst_case(solution)
+    """Describe to all digits the abscissa of the design, that of its stored numbers, and the roots."""
+    problem, case_parameters = solution.problem.posed, parameters_of_worst_case(solution)
     size = max((r.size for r in solution.of_polynomial.roots), default=1.0)
-    ideal, stored = (x if abs(x) > NOTHING * size else 0.0 for x in (solution.abscissa, solution.abscissa_realised))
-    realised = unit_at(problem, "abscissa", at).number(stored, ALL)
-    shown = show_at(problem, "abscissa", at, ideal, ALL)
-    yield f"abscissa {shown}; with the parameters rounded to doubles {realised}"
-    yield ": ".join(describe_roots(solution, ALL))
+    abscissas = (solution.abscissa, solution.abscissa_realised)
+    exact_abscissa, stored_abscissa = (x if abs(x) > ZERO_SHARE * size else 0.0 for x in abscissas)
+    stored_text = unit_at(problem, "abscissa", case_parameters).number(stored_abscissa, ALL_DIGITS)
+    exact_text = show_at(problem, "abscissa", case_parameters, exact_abscissa, ALL_DIGITS)
+    yield f"abscissa {exact_text}; with the parameters rounded to doubles {stored_text}"
+    yield ": ".join(describe_roots(solution, ALL_DIGITS))
 
 
 def _time_units(solution: Solution) -> tuple[float, Unit, Unit]:
-    """What a rate of 1 is, and the units of times and of frequencies: s and Hz, or the model's own time."""
-    of = solution.problem.posed.parameter_set
-    if of.rate is not None:
-        return float(of.rate(parameters_of_worst_case(solution))), Unit("s"), Unit("Hz")
-    natural = any(s.rate is not None for s in solution.problem.model.sets)
-    return 1.0, Unit("√(w/g)" if natural else ""), Unit("√(g/w)" if natural else "")
+    """Return the size of a rate of 1, and the units of time and of frequency: s and Hz, or the model's own units."""
+    parameter_set = solution.problem.posed.parameter_set
+    if parameter_set.rate is not None:
+        return float(parameter_set.rate(parameters_of_worst_case(solution))), Unit("s"), Unit("Hz")
+    has_natural_time = any(s.rate is not None for s in solution.problem.model.sets)
+    return 1.0, Unit("√(w/g)" if has_natural_time else ""), Unit("√(g/w)" if has_natural_time else "")
 
 
 def _name_real(solution: Solution) -> str:
-    """Which eigenfrequencies of a complex system are real."""
+    """Name the real eigenfrequencies of a complex system."""
     model = solution.problem.model
-    met = eigenfrequencies(model, roots_on_axis(model, solution.roots))
-    real = [format_frequency(z.re, 0.0, 5, z.multiplicity, NOTHING * abs(model.carrier or 0.0)) for z in met]
-    return f"; {' and '.join(real)} {'is' if len(real) == 1 else 'are'} real" if real else ""
+    real_frequencies = eigenfrequencies(model, roots_on_axis(model, solution.roots))
+    texts = [
+        format_frequency(z.re, 0.0, 5, z.multiplicity, ZERO_SHARE * abs(model.carrier or 0.0)) for z in real_frequencies
+    ]
+    return f"; {' and '.join(texts)} {'is' if len(texts) == 1 else 'are'} real" if texts else ""
 
 
-def _describe_twin(twin: Parameter | Quantity, x: float, digits: int = ALL) -> str:
-    """What a parameter or quantity is in the other set."""
+def _describe_twin(twin: Parameter | Quantity, x: float, digits: int = ALL_DIGITS) -> str:
+    """Write a parameter or quantity of the other set with its value."""
     return f"{twin.name} = {Unit('' if twin.unit == '1' else twin.unit).show(x, digits)}"

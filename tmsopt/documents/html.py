@@ -1,6 +1,6 @@
-"""A document as HTML: a page that needs nothing from elsewhere, or a fragment for a notebook.
+"""A document as HTML: a page in one file, or a fragment for a notebook.
 
-Whatever was given is text there, never markup.
+Texts of a problem file are escaped: they never become markup.
 """
 
 import base64
@@ -20,27 +20,27 @@ from matplotlib.axes import Axes
 from tmsopt.documents.blocks import Badge, Block, Chapter, Document, Figure, Listing, Sentence, TableBlock, Verbatim
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$|none$")
-_UNSHOWN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
-_LONG = 24  # characters of a cell in a column that stays wide
-_FILTERED = 12  # rows from which a table has a field that filters them
-_ON_PAPER = 100  # rows of a table at most, in document.css too
-_HOLDERS = ("problem", "asked", "study", "design")  # attributes of a result that may have a title
-_LARGEST = 500_000  # bytes of a drawing; one with more, such as of thousands of marks, is an image of dots
-_DOTS = 160  # an inch
+_CONTROLS = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+_LONG_CELL = 24  # a column with a cell of more characters stays wide
+_MIN_FILTER_ROWS = 12  # a table with so many rows has a field that filters them
+_PAPER_ROWS = 100  # maximum number of rows of a table on paper; document.css has the same number
+_TITLED_FIELDS = ("problem", "asked", "study", "design")  # attributes of a result that may have a title
+_MAX_DRAWING_BYTES = 500_000  # a drawing with more bytes, such as one of thousands of marks, is saved as a bitmap
+_DOTS_PER_INCH = 160
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
-"""Nothing is asked of any server, whatever the page holds."""
+"""Content Security Policy: the page loads nothing from any server."""
 _BADGE = "border:1px solid currentColor;border-radius:.7em;padding:0 .6em;margin-right:.4em;white-space:nowrap"
 _MARKS = {"good": "rgba(0,158,115,.35)", "bad": "rgba(213,94,0,.45)", "doubt": "rgba(230,159,0,.4)"}
 
 
-def to_page(document: Document, more: Iterable[tuple[Chapter, str]] = ()) -> str:
-    """The whole page.
+def to_page(document: Document, extra_sections: Iterable[tuple[Chapter, str]] = ()) -> str:
+    """Write the whole page.
 
     Args:
-        more: further sections, with markup that stands in them.
+        extra_sections: chapters that follow those of the document, each with its markup.
     """
     title = escape_text(document.title or "untitled")
-    parts = [(section, _mark_up(section.blocks)) for section in document.sections] + list(more)
+    parts = [(section, _mark_up(section.blocks)) for section in document.sections] + list(extra_sections)
     parts = [(section, body) for section, body in parts if body]
     links = " ".join(f'<a href="#{section.name}">{escape_text(section.title)}</a>' for section, _ in parts)
     body = "\n".join(_mark_section(section, markup) for section, markup in parts)
@@ -74,10 +74,10 @@ def to_page(document: Document, more: Iterable[tuple[Chapter, str]] = ()) -> str
 
 
 def to_fragment(document: Document, draw: Callable[[], Axes] | None = None) -> str:
-    """A fragment without colours of text or background of its own: it can be read in dark and in light.
+    """Write a fragment that sets no colours of text or background, so that dark and light themes can show it.
 
     Args:
-        draw: draws the picture at its end.
+        draw: draws the picture at the end of the fragment.
     """
     kind = f" <small>{document.kind}</small>" if document.title else ""
     head = f"<div><strong>{escape_text(document.title or document.kind)}</strong>{kind}</div>"
@@ -88,28 +88,28 @@ def to_fragment(document: Document, draw: Callable[[], Axes] | None = None) -> s
     )
 
 
-def mark_badges(said: Iterable[Badge]) -> str:
-    """What a result is and how it ended, a mark for each word."""
+def mark_badges(badges: Iterable[Badge]) -> str:
+    """Mark up the words of a headline, one badge for each."""
     return " ".join(
         f'<span style="{_BADGE};background:{_MARKS.get(word.tone, "none")}">{escape_text(word.text)}</span>'
-        for word in said
+        for word in badges
     )
 
 
 def escape_text(text: str) -> str:
-    """A text inside an element or an attribute; controls, of what is shown too, become marks."""
-    return escape(_UNSHOWN.sub("\ufffd", text))
+    """Escape a text for an element or an attribute; control characters, also those of text direction, become �."""
+    return escape(_CONTROLS.sub("\ufffd", text))
 
 
 def mark_verbatim(text: str, label: str) -> str:
-    """A text as it is; it may be wider than the page, and is then reached by the keyboard too."""
+    """Mark up an unchanged text; if it is wider than the page, the keyboard can scroll it too."""
     return f'<pre tabindex="0" role="group" aria-label="{escape_text(label)}">\n{escape_text(text)}</pre>'
 
 
 def mark_list(items: Iterable[tuple[str, str]]) -> str:
-    """Labels with what there is to say of each."""
+    """Mark up labels with their texts; empty texts are left out."""
     listed = "\n".join(
-        f"<div><dt>{escape_text(name)}</dt><dd>{escape_text(said)}</dd></div>" for name, said in items if said
+        f"<div><dt>{escape_text(name)}</dt><dd>{escape_text(text)}</dd></div>" for name, text in items if text
     )
     return f"<dl>\n{listed}\n</dl>" if listed else ""
 
@@ -125,16 +125,16 @@ def _mark_up(blocks: Sequence[Block], plain: bool = False) -> str:
 
 
 def _mark_up_runs(blocks: Sequence[Block], plain: bool) -> Iterator[str]:
-    """Facts that follow each other are one list; pictures that do stand beside each other where there is room."""
-    for (kind, labelled), run in groupby(blocks, key=lambda b: (type(b), isinstance(b, Sentence) and bool(b.label))):
-        some: list[Any] = list(run)
-        if labelled:
-            yield mark_list((one.label, one.text) for one in some)
-        elif kind is Figure and len(some) > 1:
-            drawn = "\n".join(map(draw_figure, some))
-            yield f'<div class="beside">\n{drawn}\n</div>'
+    """Join consecutive facts to one list, and consecutive pictures to one row if there is room."""
+    for (kind, is_labelled), run in groupby(blocks, key=lambda b: (type(b), isinstance(b, Sentence) and bool(b.label))):
+        members: list[Any] = list(run)
+        if is_labelled:
+            yield mark_list((sentence.label, sentence.text) for sentence in members)
+        elif kind is Figure and len(members) > 1:
+            figures = "\n".join(map(draw_figure, members))
+            yield f'<div class="beside">\n{figures}\n</div>'
         else:
-            yield from (_mark_up_block(one, plain) for one in some)
+            yield from (_mark_up_block(block, plain) for block in members)
 
 
 def _mark_up_block(block: Block, plain: bool) -> str:
@@ -153,10 +153,10 @@ def _mark_up_block(block: Block, plain: bool) -> str:
 
 
 def _mark_table(grid: TableBlock, plain: bool) -> str:
-    """A table that can be sorted, a long one filtered too, without columns in which nothing stands."""
-    rows, most = grid.texts, grid.most
-    if plain and most is not None and len(rows) > most:
-        rows = [*rows[:most], ["…"] * len(rows[0])]
+    """Mark up a table without its empty columns. Readers can sort it, and filter it if it is long."""
+    rows, max_rows = grid.texts, grid.max_rows
+    if plain and max_rows is not None and len(rows) > max_rows:
+        rows = [*rows[:max_rows], ["…"] * len(rows[0])]
     columns = [column for column in zip(*rows, strict=True) if any(column[1:])]
     if not columns:
         return ""
@@ -167,10 +167,10 @@ def _mark_table(grid: TableBlock, plain: bool) -> str:
     lines = "\n".join(f"<tr>{_mark_cells(row, kinds)}</tr>" for row in body)
     if plain:
         return f"<table>{head}<tbody>{lines}</tbody></table>"
-    said = f"On paper are the first {_ON_PAPER} of the rows that are shown."
-    paper = f'\n<p class="print">{said}</p>' if len(body) > _ON_PAPER else ""
+    note = f"On paper, the table ends after {_PAPER_ROWS} of the rows shown."
+    paper = f'\n<p class="print">{note}</p>' if len(body) > _PAPER_ROWS else ""
     caption = escape_text(grid.caption)
-    kind = f' class="sortable{" filterable" if len(body) >= _FILTERED else ""}"' if head else ""
+    kind = f' class="sortable{" filterable" if len(body) >= _MIN_FILTER_ROWS else ""}"' if head else ""
     return (
         f'<div class="rows" role="group" tabindex="0" aria-label="{caption}"><table{kind}>\n'
         f"<caption>{caption}</caption>\n{head}\n<tbody>\n{lines}\n</tbody>\n</table></div>{paper}"
@@ -183,50 +183,52 @@ def _mark_cells(row: Sequence[str], kinds: Sequence[str]) -> str:
 
 
 def _classify_column(cells: Sequence[str]) -> str:
-    """Whether a column is of numbers, of long words, or of short ones."""
+    """Return the class of a column of numbers or of long texts; empty for short texts."""
     if all(_NUMBER.match(cell) for cell in cells if cell):
         return ' class="number"'
-    return ' class="long"' if max(map(len, cells)) > _LONG else ""
+    return ' class="long"' if max(map(len, cells)) > _LONG_CELL else ""
 
 
 def draw_figure(figure: Figure) -> str:
-    """A figure with its caption; empty where it cannot be drawn, for the rest of the page says what there is.
+    """Mark up a figure with its caption; return an empty text if the figure cannot be drawn.
 
-    Letters are outlines, and a drawing is an image apart from the page: nothing in it is markup of the page.
+    Letters are outlines. The drawing is an embedded image, so that nothing in it becomes markup of the page.
     """
     try:
-        drawn = figure.draw(_remove_titles(figure.result))
-        data, kind = _save_image(drawn, "svg"), "svg+xml"
-        if len(data) > _LARGEST:
-            data, kind = _save_image(drawn, "png"), "png"
-    except Exception:  # of a design without roots, of a chart over three parameters, …
+        picture = figure.draw(_remove_titles(figure.result))
+        data, kind = _save_image(picture, "svg"), "svg+xml"
+        if len(data) > _MAX_DRAWING_BYTES:
+            data, kind = _save_image(picture, "png"), "png"
+    except Exception:  # such as a design without roots, or a chart over three parameters
         return ""
-    said = escape_text(figure.caption)
+    caption = escape_text(figure.caption)
     source = f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
-    return f'<figure><img alt="{said}" src="{source}"><figcaption>{said}</figcaption></figure>'
+    return f'<figure><img alt="{caption}" src="{source}"><figcaption>{caption}</figcaption></figure>'
 
 
 def _remove_titles(result: Any) -> Any:
     names = {f.name for f in fields(result) if f.init}
-    held = {n: _remove_titles(v) for n in _HOLDERS if n in names and is_dataclass(v := getattr(result, n))}
-    return replace(result, **held, **({"title": ""} if "title" in names else {}))
+    stripped_fields = {
+        n: _remove_titles(v) for n in _TITLED_FIELDS if n in names and is_dataclass(v := getattr(result, n))
+    }
+    return replace(result, **stripped_fields, **({"title": ""} if "title" in names else {}))
 
 
 def _draw_thumbnail(draw: Callable[[], Axes], name: str) -> str:
-    """The picture for a notebook; none where it cannot be drawn: a display must not break over it."""
+    """Mark up the picture for a notebook; empty if it cannot be drawn, because a display must not fail."""
     try:
-        coded = base64.b64encode(_save_image(draw(), "png", 100)).decode()
-    except Exception:  # whatever it was, the rest says what the result is
+        data = base64.b64encode(_save_image(draw(), "png", 100)).decode()
+    except Exception:  # the rest of the fragment shows the result
         return ""
-    return f'<img alt="{escape_text(name)}" style="max-width:100%" src="data:image/png;base64,{coded}">'
+    return f'<img alt="{escape_text(name)}" style="max-width:100%" src="data:image/png;base64,{data}">'
 
 
-def _save_image(drawn: Any, kind: str, dots: int = _DOTS) -> bytes:
-    """The same bytes for the same figure, whenever it is drawn."""
+def _save_image(picture: Any, kind: str, dots: int = _DOTS_PER_INCH) -> bytes:
+    """Save a picture as an image; the same figure always gives the same bytes."""
     image = io.BytesIO()
-    figure = drawn.figure.figure if isinstance(drawn, Axes) else drawn
-    about = {"Date": None} if kind == "svg" else {}
+    figure = picture.figure.figure if isinstance(picture, Axes) else picture
+    metadata = {"Date": None} if kind == "svg" else {}
     with rc_context({"svg.hashsalt": "tmsopt", "svg.fonttype": "path"}), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph", UserWarning)  # of letters that no font here has: boxes show that
-        figure.savefig(image, format=kind, dpi=dots, bbox_inches="tight", metadata=about)
+        warnings.filterwarnings("ignore", "Glyph", UserWarning)  # letters that no font has are shown as boxes
+        figure.savefig(image, format=kind, dpi=dots, bbox_inches="tight", metadata=metadata)
     return image.getvalue()

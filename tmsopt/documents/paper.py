@@ -1,4 +1,4 @@
-"""A design compared with the laws of the paper, and the paper recomputed."""
+"""Documents of a comparison with the laws of the paper, and of the recomputed paper."""
 
 import re
 import textwrap
@@ -32,12 +32,12 @@ _ABOUT = (
 
 
 def write_comparison(comparison: Comparison, _level: Level) -> Parts:
-    """Laws and numbers side by side where laws are known, then the two formulations."""
-    applying = [row for row in comparison.laws if row.applies]
-    agree = sum(row.agrees is True for row in applying)
-    tone: Tone = "doubt" if not applying else "good" if agree == len(applying) else "bad"
-    also = f"solved as {comparison.other.formulation} too" if comparison.other else "no other formulation"
-    yield Badge(f"{agree} of {len(applying)} laws agree", tone), also
+    """Write laws and numbers side by side if the model has laws, then the two formulations."""
+    applicable_laws = [row for row in comparison.laws if row.applies]
+    agreements = sum(row.agrees is True for row in applicable_laws)
+    tone: Tone = "doubt" if not applicable_laws else "good" if agreements == len(applicable_laws) else "bad"
+    badge_text = f"solved as {comparison.other.formulation} too" if comparison.other else "no other formulation"
+    yield Badge(f"{agreements} of {len(applicable_laws)} laws agree", tone), badge_text
     design = comparison.design
     model = design.problem.model
     yield from write_headline(design)
@@ -47,9 +47,9 @@ def write_comparison(comparison: Comparison, _level: Level) -> Parts:
         yield from _write_laws(comparison)
     else:
         yield Chapter("laws")
-        named = f"the {model.title}" if model.statement is None else f"'{model.title}'"
-        of_skates = "" if model.carrier is not None else ", only of skates (tms)"
-        yield f"no laws are known of {named}{of_skates}"
+        model_name = f"the {model.title}" if model.statement is None else f"'{model.title}'"
+        of_skates = "" if model.carrier is not None else ", only for skates (tms)"
+        yield f"no laws are known for {model_name}{of_skates}"
     yield Chapter("formulations")
     if comparison.other is None:
         yield Sentence(f"none, {comparison.reason}", "other formulation")
@@ -62,22 +62,22 @@ def write_comparison(comparison: Comparison, _level: Level) -> Parts:
 
 def _write_laws(comparison: Comparison) -> Parts:
     rows: list[Row] = [("law", "of", "numeric", "law says", "relative", "verdict")]
-    silent: dict[str, list[str]] = {}
+    inapplicable_laws: dict[str, list[str]] = {}
     for row in comparison.laws:
         if row.applies:
             verdict = "agrees" if row.agrees else "DIFFERS"
             rows.append((row.label, row.subject, Cell(row.numeric), Cell(row.law), f"{row.relative:.1e}", verdict))
         else:
-            silent.setdefault(row.reason, []).append(f"{row.label} ({row.subject})")
-    yield TableBlock(rows, "Laws and numbers", needs=(9, 5, 7, 7, 6, 8))
-    for reason, named in silent.items():
-        yield Sentence(f"{', '.join(named)}; {reason}", "not applicable to this design")
+            inapplicable_laws.setdefault(row.reason, []).append(f"{row.label} ({row.subject})")
+    yield TableBlock(rows, "Laws and numbers", priorities=(9, 5, 7, 7, 6, 8))
+    for reason, labels in inapplicable_laws.items():
+        yield Sentence(f"{', '.join(labels)}; {reason}", "not applicable to this design")
 
 
 def write_ledger(ledger: Ledger, level: Level) -> Parts:
-    """Every entry under its section, with the number of entries per verdict at the end."""
-    counted = (f"{count} {verdict}" for verdict, count in ledger.counts.items() if count)
-    yield count_things(ledger.entries, "entry", "entries"), *counted
+    """Write every entry under its section, then the number of entries per verdict."""
+    verdict_counts = (f"{count} {verdict}" for verdict, count in ledger.counts.items() if count)
+    yield count_things(ledger.entries, "entry", "entries"), *verdict_counts
     if level == "brief":
         yield ledger.source
     for number, (title, entries) in enumerate(groupby(ledger.entries, key=lambda entry: entry.section)):
@@ -93,12 +93,12 @@ def write_ledger(ledger: Ledger, level: Level) -> Parts:
 
 
 def _list_entry(entry: Entry) -> list[tuple[str, str]]:
-    said = {"printed": entry.printed, "computed": entry.computed, "route": entry.route, "remark": entry.remark}
-    return [(name, text) for name, text in said.items() if text]
+    facts = {"printed": entry.printed, "computed": entry.computed, "route": entry.route, "remark": entry.remark}
+    return [(name, text) for name, text in facts.items() if text]
 
 
 def write_ledger_page(ledger: Ledger) -> str:
-    """The ledger as a Markdown page: a summary, then every entry under its section."""
+    """Write the ledger as a Markdown page: a summary, then every entry under its section."""
     lines = [
         "# The paper, recomputed",
         "",
@@ -120,5 +120,5 @@ def write_ledger_page(ledger: Ledger) -> str:
 
 
 def _escape(text: str) -> str:
-    """Text in which Markdown reads no markup."""
+    """Escape a text, so that Markdown finds no markup in it."""
     return re.sub(r"([\\*_|<^])", r"\\\1", text)

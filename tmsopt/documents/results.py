@@ -1,4 +1,4 @@
-"""From a result to its document, its headline, its picture and its page: the table of all results."""
+"""The document, headline, picture and page of any result, and the table of all kinds of results."""
 
 import math
 import platform
@@ -39,25 +39,25 @@ _RESULTS = {
     "paper": {"Comparison": "draw_comparison", "Ledger": "draw_ledger"},
     "descriptions": {"Description": ""},
 }
-"""Module → the results that it shows, each with what draws it in `tmsopt.plots`, empty where nothing does.
+"""Module → class of result → function in `tmsopt.plots` that draws it; empty if the result has no picture.
 
-The module, loaded when one of them is shown, has for each a generator of its parts, such as `write_solution`.
+The module has a generator for each class, such as `write_solution`. It is imported at its first use.
 """
 
 HOME = {name: module for module, names in _RESULTS.items() for name in names}
-"""Class of a result → the module that shows it."""
+"""Class of a result → the module that writes its document."""
 
 ENDINGS = ("html", "htm")
-"""Endings of the file name of a page."""
+"""File name endings of a page."""
 
 _PACKAGES = ("tmsopt", "CasADi", "NumPy")
 
 
 def document_of(result: Any, level: Level = "brief", **options: Any) -> Document:
-    """The document of a result.
+    """Build the document of a result.
 
     Args:
-        options: of its writer, such as `si` of a solution.
+        options: options of its `write_` function, such as `si` of `write_solution`.
     """
     cover, parts = _open(result, level, **options)
     blocks: list[Block] = []
@@ -77,7 +77,7 @@ def document_of(result: Any, level: Level = "brief", **options: Any) -> Document
 
 
 def _open(result: Any, level: Level, **options: Any) -> tuple[Document, Parts]:
-    """The document without its chapters, and the parts that these are made of."""
+    """Return the document without its chapters, and a generator of their parts."""
     name = type(result).__name__
     module: Any = import_module(f"tmsopt.documents.{HOME[name]}")
     parts = getattr(module, f"write_{name.lower()}")(result, level, **options)
@@ -86,36 +86,36 @@ def _open(result: Any, level: Level, **options: Any) -> tuple[Document, Parts]:
 
 
 def picture_of(result: Any) -> str:
-    """The name in `tmsopt.plots` of what draws a result; empty where nothing does."""
+    """Return the name of the function in `tmsopt.plots` that draws a result; empty if it has no picture."""
     name = type(result).__name__
     return _RESULTS[HOME[name]][name]
 
 
 def report(result: Any, full: bool = False) -> str:
-    """The text of a result."""
+    """Write the report of a result as text."""
     return to_text(document_of(result, "full" if full else "brief"))
 
 
 def headline(result: Any) -> str:
-    """What it is and how it ended, then its title as far as there is room."""
+    """Write the kind of a result, how its computation ended, and its title as far as it fits, in one line."""
     cover, _ = _open(result, "brief")
     return to_headline(cover)
 
 
 def title_of(result: Any) -> str:
-    """The title of a result, or of the study, problem or design that it is of, on one line; empty without one."""
+    """Find the title of a result, or of its study, problem or design; empty if there is none."""
     designs = (getattr(result, "design", None), *getattr(result, "solutions", ()))
     holders = (result, getattr(result, "study", None), *designs)
-    titled = (*holders, *(getattr(holder, "problem", None) for holder in holders))
-    known = getattr(result, "about", {}).get("title", "")  # of a chart, whose folder may not hold its problem
-    return " ".join(next((t for x in titled if (t := getattr(x, "title", ""))), known).split())
+    candidates = (*holders, *(getattr(holder, "problem", None) for holder in holders))
+    stored_title = getattr(result, "about", {}).get("title", "")  # a chart's folder may not contain its problem
+    return " ".join(next((t for x in candidates if (t := getattr(x, "title", ""))), stored_title).split())
 
 
 def draw(result: Any, ax: "Axes | None" = None) -> "Axes":
-    """A result drawn into Axes.
+    """Draw a result into Axes.
 
     Raises:
-        InputError: where nothing draws it, or for what are no Axes.
+        InputError: if the result has no picture, or if `ax` is not Axes.
     """
     from matplotlib.axes import Axes
 
@@ -131,7 +131,7 @@ def draw(result: Any, ax: "Axes | None" = None) -> "Axes":
 
 
 def plot(result: Any, ax: "Axes | None" = None) -> "Axes":
-    """The same for a user: a new figure is one of pyplot's, which a notebook and ``plt.show()`` show.
+    """Draw a result for a user: pyplot manages a new figure, so that a notebook or ``plt.show()`` shows it.
 
     Raises:
         InputError: as `draw`.
@@ -150,7 +150,7 @@ def plot(result: Any, ax: "Axes | None" = None) -> "Axes":
 
 
 def to_notebook(result: Any) -> str:
-    """A result for a notebook: its words, its brief document, its picture."""
+    """Write a result for a notebook: its words, its brief document and its picture."""
     from tmsopt.documents.html import to_fragment
 
     options: dict[str, Any] = {"tabulated": True} if type(result).__name__ == "Solution" else {}
@@ -172,15 +172,15 @@ def save_report(
 
     Args:
         path: ends in html or htm.
-        command: that found it, as typed.
+        command: the command that computed the result, as typed.
         files: name → text of the files that state the problem.
-        seed: of the starts.
-        full: with all that takes long: active limits moved and solved again, every number of the report.
+        seed: random seed of the starts.
+        full: whether to include slow analyses: active limits moved and solved again, and every number of the report.
         design: the solution that a proof is about, for pictures and the explorer.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
-        InputError: for an object that is no result, or another ending.
+        InputError: if `result` is not a result, or if `path` has another ending.
         OSError: when the file cannot be written.
 
     Example:
@@ -208,19 +208,19 @@ def save_report(
         steps(1, math.nan, "the document is done")
     text = mark_verbatim(report(result, full), "report as text")
     origin = _mark_origin({"command": command, **(files or {})}, getattr(getattr(result, "study", None), "seed", seed))
-    more = (
+    extra_sections = (
         (Chapter("explorer", width="whole"), frame_explorer(result, design)),
         (Chapter("text", "As text", "whole"), f"<details><summary>The report as text</summary>{text}</details>"),
-        (Chapter("origin", "Where it is from", "whole"), origin),
+        (Chapter("origin", "Origin", "whole"), origin),
     )
-    write_text(place, to_page(document, more))
+    write_text(place, to_page(document, extra_sections))
 
 
 def _mark_origin(texts: Mapping[str, str], seed: int | None) -> str:
-    """Versions, system, date, seed, then the command and the files."""
+    """Mark up versions, system, date and seed, then the command and the files."""
     from tmsopt.documents.html import escape_text, mark_list, mark_verbatim
 
-    about = {name: found or "" for name, found in installed_versions(_PACKAGES).items()} | {
+    about = {name: version or "" for name, version in installed_versions(_PACKAGES).items()} | {
         "Python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}".strip(),
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
@@ -230,15 +230,15 @@ def _mark_origin(texts: Mapping[str, str], seed: int | None) -> str:
     return mark_list(about.items()) + "\n".join(marked)
 
 
-def response(solution: Any, **asked: Any) -> Any:
-    """The motion of a solution, for its method of that name."""
-    from tmsopt.dynamics import simulate  # and SciPy, which only this needs
+def response(solution: Any, **options: Any) -> Any:
+    """Simulate the motion of a solution; the method `Solution.response` calls this function."""
+    from tmsopt.dynamics import simulate  # imports SciPy, which nothing else here needs
 
-    return simulate(solution, **asked)
+    return simulate(solution, **options)
 
 
 def analyse(solution: Any) -> Any:
-    """What a report says beyond the numbers of a solution, for its attribute of that name."""
+    """Create the analyses of a solution; the attribute `Solution.analysis` calls this function."""
     from tmsopt.documents.analysis import Analysis
 
     return Analysis(solution)

@@ -1,4 +1,4 @@
-"""How far the boundaries of a design are."""
+"""Documents on the distances from a design to the boundaries of stability."""
 
 import math
 from collections.abc import Sequence
@@ -8,63 +8,66 @@ from tmsopt.documents.blocks import Cell, Chapter, Level, Parts, Sentence, Table
 from tmsopt.models import in_words_of, words_of
 from tmsopt.problem.unit_system import unit_of
 
-_MAIN = 0.5
-"""Share of the largest change above which a parameter is named in the headline."""
-_WIDE = 12
-"""Parameters up to which each has a column; of more, each has a row."""
-_LITTLE = 1e-3
-"""Share of the largest change below which one is 0."""
-_NAMED = 3
-"""Parameters named in the headline at most."""
+_MAIN_SHARE = 0.5
+"""The headline names a parameter whose change is at least this share of the largest change."""
+_MAX_COLUMNS = 12
+"""With more parameters, the table has a row instead of a column for each parameter."""
+_ZERO_SHARE = 1e-3
+"""A change that is less than this share of the largest change is shown as 0."""
+_MAX_NAMES = 3
+"""Maximum number of parameters that the headline names."""
 _OF_H = {"weave": "a real eigenfrequency"}
 _ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
 
 
-def write_robustness(found: Robustness, _level: Level) -> Parts:
-    """The sentence, then the nearest point of every boundary."""
-    radius = _format_value("radius" if found.stable else "to stability", found.limit.distance)
-    yield judge(found.stable, "stable"), radius, f"to {found.limit.kind}" if found.limit.found else ""
-    yield Sentence(describe_robustness(found), "robustness", "answer")
+def write_robustness(robustness: Robustness, _level: Level) -> Parts:
+    """Write one sentence, then the nearest point of every boundary."""
+    radius = _format_value("radius" if robustness.stable else "to stability", robustness.limit.distance)
+    yield judge(robustness.stable, "stable"), radius, f"to {robustness.limit.kind}" if robustness.limit.found else ""
+    yield Sentence(describe_robustness(robustness), "robustness", "answer")
     yield Chapter("boundaries")
-    yield tabulate_boundaries(found)
+    yield tabulate_boundaries(robustness)
 
 
-def describe_robustness(found: Robustness, on_edge: bool = False) -> str:
-    """How large a change ends stability, or brings it, how, and by which parameters mostly.
+def describe_robustness(robustness: Robustness, on_edge: bool = False) -> str:
+    """Describe the smallest change that makes a design unstable (or stable), its cause, and its main parameters.
 
     Args:
-        on_edge: whether the solution is on the edge of stability by more than its numbers as stored tell.
+        on_edge: whether the ideal design is on the edge of stability; its stored numbers may miss it.
     """
-    if found.edges:
-        edge = _ON_EDGE if found.problem.model.carrier is None else _OF_H
-        on = " and ".join(edge[kind] for kind in found.edges)
-        if found.zeros:
-            return f"at its edge already: {', '.join(f'{n} = 0' for n in found.zeros)} ({on})"
-        return f"none, on the edge of stability already, with {on}"
+    if robustness.edges:
+        edge = _ON_EDGE if robustness.problem.model.carrier is None else _OF_H
+        edge_names = " and ".join(edge[kind] for kind in robustness.edges)
+        if robustness.zeros:
+            zeros = ", ".join(f"{n} = 0" for n in robustness.zeros)
+            return f"none: the design is on the edge of stability, because {zeros} ({edge_names})"
+        return f"none: the design is on the edge of stability, with {edge_names}"
     if on_edge:
-        return "none, on the edge of stability already, up to rounding errors"
-    limit, other = found.limit, "unstable" if found.stable else "stable"
+        return "none: the design is on the edge of stability, up to rounding errors"
+    limit, new_state = robustness.limit, "unstable" if robustness.stable else "stable"
     if not limit.found:
-        return f"{'' if found.stable else 'not stable; '}no change in reach of the search makes it {other}"
-    if not found.stable:
-        return f"not stable; {_describe_size(found)} makes it stable{_name_largest(limit)}"
-    how = words_of(found.problem.model).get(limit.kind, "a root passes through infinity, a0 = 0")
-    return f"{_describe_size(found)} makes it unstable ({how}){_name_largest(limit)}"
+        return f"{'' if robustness.stable else 'not stable; '}the search found no change that makes it {new_state}"
+    if not robustness.stable:
+        return f"not stable; {_describe_size(robustness)} makes it stable{_name_largest(limit)}"
+    cause = words_of(robustness.problem.model).get(limit.kind, "a root passes through infinity, a0 = 0")
+    return f"{_describe_size(robustness)} makes it unstable ({cause}){_name_largest(limit)}"
 
 
-def tabulate_boundaries(found: Robustness) -> TableBlock:
-    """The nearest point of every boundary: its distance and the change of each parameter."""
-    names, model = list(found.weights), found.problem.model
-    kinds: tuple[Nearest, ...] = (found.weave, found.capsize, found.infinity, found.heavy_damping)
-    units = {name: unit_of(found.problem.posed, name) for name in names}
-    rows: list[Sequence[str]] = [("relative changes" if found.relative else "changes over weights", "distance", *names)]
+def tabulate_boundaries(robustness: Robustness) -> TableBlock:
+    """Tabulate the nearest point of every boundary: its distance and the change of each parameter."""
+    names, model = list(robustness.weights), robustness.problem.model
+    kinds: tuple[Nearest, ...] = (robustness.weave, robustness.capsize, robustness.infinity, robustness.heavy_damping)
+    units = {name: unit_of(robustness.problem.posed, name) for name in names}
+    rows: list[Sequence[str]] = [
+        ("relative changes" if robustness.relative else "changes over weights", "distance", *names)
+    ]
     places: list[Sequence[str]] = []
     for n in kinds if model.carrier is None else kinds[:1]:
         distance = "" if n.found else "none found"
         moves = ["" for _ in names]
         if n.found and n.distance > 0:
-            distance = _format_percent(n.distance) if found.relative else f"{n.distance:.4g}"
-            moves = _format_moves(n, found.relative)
+            distance = _format_percent(n.distance) if robustness.relative else f"{n.distance:.4g}"
+            moves = _format_moves(n, robustness.relative)
             places.append(
                 (
                     f"values at {in_words_of(model, n.kind)}",
@@ -72,55 +75,61 @@ def tabulate_boundaries(found: Robustness) -> TableBlock:
                     *(units[name].show(n.parameters[name], 8) for name in names),
                 )
             )
-        rows.append((_name_row(n, found), distance, *moves))
-    rows += [("weight", "", *(units[name].show(found.weights[name], 6) for name in names)), *places]
-    transposed = len(names) > _WIDE
-    return TableBlock(list(zip(*rows, strict=True)) if transposed else rows, "Nearest points of the boundaries")
+        rows.append((_name_row(n, robustness), distance, *moves))
+    rows += [("weight", "", *(units[name].show(robustness.weights[name], 6) for name in names)), *places]
+    is_transposed = len(names) > _MAX_COLUMNS
+    return TableBlock(list(zip(*rows, strict=True)) if is_transposed else rows, "Nearest points of the boundaries")
 
 
-def write_nearest(found: Nearest, _level: Level) -> Parts:
-    """How far one boundary is, then its nearest point and the change of each parameter in weights."""
-    yield found.kind, _format_value("distance", found.distance) if found.found else "none found"
-    if not found.found:
-        yield f"no point of the boundary of {found.kind} was found"
+def write_nearest(nearest: Nearest, _level: Level) -> Parts:
+    """Write the distance to one boundary, then its nearest point and the change of each parameter in weights."""
+    yield nearest.kind, _format_value("distance", nearest.distance) if nearest.found else "none found"
+    if not nearest.found:
+        yield f"no point of the boundary of {nearest.kind} was found"
         return
-    crossing = "" if found.refined else ", the nearest crossing seen"
-    yield Sentence(f"{found.distance:.6g} in weights{crossing}", f"to {found.kind}", "answer")
+    crossing = "" if nearest.refined else ", the nearest crossing seen"
+    yield Sentence(f"{nearest.distance:.6g} in weights{crossing}", f"to {nearest.kind}", "answer")
     yield Chapter("boundary")
-    rows = [(n, Cell(found.parameters[n], digits=8), f"{change:+.4g}") for n, change in found.direction.items()]
+    rows = [(n, Cell(nearest.parameters[n], digits=8), f"{change:+.4g}") for n, change in nearest.direction.items()]
     yield TableBlock((("", "there", "change in weights"), *rows), "Nearest point of the boundary")
 
 
-def _name_row(n: Nearest, found: Robustness) -> str:
-    to = "at the edge of" if n.distance == 0 else "change to"
+def _name_row(n: Nearest, robustness: Robustness) -> str:
+    prefix = "at the edge of" if n.distance == 0 else "change to"
     if n.kind != "heavy damping":
-        return f"{to} {in_words_of(found.problem.model, n.kind)}"
-    return f"{to} {n.kind}" if n.distance == 0 else f"change {'out of' if found.heavily_damped else 'into'} {n.kind}"
+        return f"{prefix} {in_words_of(robustness.problem.model, n.kind)}"
+    return (
+        f"{prefix} {n.kind}"
+        if n.distance == 0
+        else f"change {'out of' if robustness.heavily_damped else 'into'} {n.kind}"
+    )
 
 
 def _format_moves(n: Nearest, relative: bool) -> list[str]:
-    """The change of each parameter; 0 for one that is too little to matter."""
+    """List the change of each parameter; a negligible change is 0."""
     largest = max(map(abs, n.direction.values()))
-    shown = (x if abs(x) >= _LITTLE * largest else 0.0 for x in n.direction.values())
-    return ["0" if x == 0 else _format_percent(x, "+") if relative else f"{x:+.3g}" for x in shown]
+    changes = (x if abs(x) >= _ZERO_SHARE * largest else 0.0 for x in n.direction.values())
+    return ["0" if x == 0 else _format_percent(x, "+") if relative else f"{x:+.3g}" for x in changes]
 
 
 def _name_largest(limit: Nearest) -> str:
-    """The parameters that change most."""
+    """Name the parameters that change most."""
     changes = sorted(limit.direction.items(), key=lambda item: -abs(item[1]))
     largest = abs(changes[0][1])
-    named = [n for n, x in changes if largest > 0 and abs(x) >= _MAIN * largest]
-    return f"; largest changes: {', '.join(named[:_NAMED])}" if named and len(changes) > 1 else ""
+    names = [n for n, x in changes if largest > 0 and abs(x) >= _MAIN_SHARE * largest]
+    return f"; largest changes: {', '.join(names[:_MAX_NAMES])}" if names and len(changes) > 1 else ""
 
 
-def _describe_size(found: Robustness) -> str:
-    if found.relative:
-        return f"a change of {_format_percent(found.limit.distance)}"
-    return f"a change of {found.limit.distance:.2g} times {'your' if found.problem.weights else 'the'} weights"
+def _describe_size(robustness: Robustness) -> str:
+    if robustness.relative:
+        return f"a change of {_format_percent(robustness.limit.distance)}"
+    return (
+        f"a change of {robustness.limit.distance:.2g} times {'your' if robustness.problem.weights else 'the'} weights"
+    )
 
 
 def _format_percent(x: float, sign: str = "") -> str:
-    """Two significant digits at least."""
+    """Write a percentage with at least two significant digits."""
     digits = 1 if x == 0 else max(1 - math.floor(math.log10(abs(100 * x))), 0)
     return f"{100 * x:{sign}.{digits}f} %"
 

@@ -1,4 +1,4 @@
-"""The report of a solution: the answer first, then what it does, its limits, how sure it is, and how to see more."""
+"""The report of a solution: the answer, then the design, its motion, its limits, robustness, and further commands."""
 
 import math
 from collections.abc import Iterator
@@ -7,7 +7,7 @@ from tmsopt import plots
 from tmsopt.analysis import Explanation, Lever, bound_lines, proof_line, structure_line
 from tmsopt.documents.analysis import Analysis
 from tmsopt.documents.blocks import (
-    ALL,
+    ALL_DIGITS,
     Badge,
     Cell,
     Chapter,
@@ -50,16 +50,16 @@ from tmsopt.problem.verdict.stability import ROUNDED, STABLE, UNSTABLE
 from tmsopt.problem.verdict.status import describe_status, describe_verdict
 from tmsopt.records import Numbers
 
-_FOLD, _FIXED = 5, 14  # rows of free parameters below each other, and fixed ones named, of a brief report
-_LIMITS = 3  # limits that a brief report shows
+_FOLD, _MAX_FIXED = 5, 14  # in a brief report, free parameters in one column, and the most fixed parameters named
+_MAX_LIMITS = 3  # a brief report shows at most so many limits
 _OTHER = {"a0": "must not be 0", "coefficients": "must have values"}
 
 
 def _summarise(solution: Solution) -> tuple[Badge | str, ...]:
-    """Status, objective, structure, proof, stability."""
+    """Return the words of the headline: status, objective, structure, proof, stability."""
     problem, stability = solution.problem.posed, solution.stability
-    asked = problem.minimize or problem.maximize
-    name, value = (asked, solution.value) if asked else ("abscissa", solution.abscissa)
+    objective = problem.minimize or problem.maximize
+    name, value = (objective, solution.value) if objective else ("abscissa", solution.abscissa)
     rounded = ROUNDED if stability.on_edge and not solution.edge_is_exact else ""
     growth = f" as {stability.growth}" if stability.growth else ""
     return (
@@ -81,23 +81,23 @@ def write_solution(
     si: Numbers | None = None,
     tabulated: bool = False,
 ) -> Parts:
-    """The parts of the report in order.
+    """Write the parts of the report in order.
 
     Args:
-        full: of a page, whether it has all that takes long.
-        si: parameters in SI, such as `si_parameters` gives for another scale: a brief report shows them then.
-        tabulated: whether a brief report, too, has every parameter with its meaning.
+        full: whether a page includes slow analyses.
+        si: parameters in SI for another scale, as from `si_parameters`. If given, a brief report shows them.
+        tabulated: whether a brief report, too, lists every parameter with its meaning.
     """
     yield _summarise(solution)
-    analysis, scaled = solution.analysis, si or convert_to_si(solution)
+    analysis, si_parameters = solution.analysis, si or convert_to_si(solution)
     full, page, brief = full or level == "full", level == "page", level == "brief"
-    found = analysis.full_explanation if full else analysis.explanation
+    explanation = analysis.full_explanation if full else analysis.explanation
     yield Chapter("conflict" if solution.status == "infeasible" else "answer")
     yield from _write_answer(solution, analysis, brief, full)
     if page:
         yield from write_bicycle(solution)
     yield Chapter("design", "Parameters", "wide")
-    yield from _write_design(solution, scaled, brief and not tabulated, si is not None)
+    yield from _write_design(solution, si_parameters, brief and not tabulated, si is not None)
     yield from (Sentence(note, "note") for note in solution.notes)
     yield Chapter("motion")
     yield from _write_motion(solution, analysis, brief)
@@ -107,28 +107,28 @@ def write_solution(
     if solution.worst is not None:
         yield from _write_cases(solution, solution.worst)
     yield Chapter("limits", width="wide")
-    yield from _write_limits(solution, found, full, page)
+    yield from _write_limits(solution, explanation, full, page)
     if not brief:
-        yield Chapter("sureness", "How sure it is")
-    yield from _write_sureness(solution, found, brief, full)
+        yield Chapter("sureness", "How certain it is")
+    yield from _write_sureness(solution, explanation, brief, full)
     if brief:
         yield _suggest_more(solution, analysis)
         return
     if full:
         yield Chapter("roots")
         if solution.multiple_as_rounded:
-            yield "roots coincide up to rounding errors; tmsopt prove tells it of the numbers as typed"
+            yield "roots coincide up to rounding errors; tmsopt prove decides it for the numbers as typed"
         for diagnosis in analysis.diagnoses:
             yield from write_diagnosis(diagnosis)
     yield Chapter("quantities", "Derived quantities", "wide")
     head = ("quantity", "value", "unit", "in SI", "meaning")
-    yield TableBlock((head, *list_quantities(solution, scaled)), "Quantities of the design")
+    yield TableBlock((head, *list_quantities(solution, si_parameters)), "Quantities of the design")
     yield Chapter("search")
     yield from _write_search(solution)
 
 
 def write_bicycle(solution: Solution) -> Parts:
-    """The bicycle to scale, or the sketch that its model has."""
+    """Write the bicycle to scale, or the sketch of its model."""
     yield Chapter("bicycle")
     if solution.problem.model is tms:
         caption = "The bicycle from its right side, to scale, in wheelbases; z points down"
@@ -138,31 +138,31 @@ def write_bicycle(solution: Solution) -> Parts:
 
 
 def write_growth_picture(solution: Solution) -> Parts:
-    """Growth rates and frequencies over the speed, or the first parameter."""
+    """Write a picture of growth rates and frequencies over the speed, or over the first parameter."""
     from tmsopt.dynamics import growth
 
     try:
-        found = growth(solution)
-    except Exception:  # a root at infinity, or nothing that could vary: nothing to draw
+        curves = growth(solution)
+    except Exception:  # a root is at infinity, or no parameter can vary: there is nothing to draw
         return
     yield Chapter("growth", "Growth and frequencies")
-    caption = f"Growth rates and frequencies over {found.over.name}; stable where it is shaded"
-    yield Figure(plots.growth_figure, found, caption)
+    caption = f"Growth rates and frequencies over {curves.over.name}; stable where it is shaded"
+    yield Figure(plots.growth_figure, curves, caption)
 
 
 def write_headline(solution: Solution) -> tuple[Sentence, Sentence]:
-    """How it ended, and what was asked, in words."""
+    """Write two sentences: how the computation ended, and the objective with its value and the structure."""
     problem = solution.problem.posed
     text = problem.minimize or problem.maximize
     value = show_at(problem, text, parameters_of_worst_case(solution), solution.value, 8) if text else ""
     located = f"locate {problem.locate}" if problem.locate else ""
-    sense = f"{problem.sense} " if problem.free else ""  # what is given is not sought
-    asked = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
-    ended = "; ".join(part for part in (describe_status(solution), describe_verdict(solution)) if part)
+    sense = f"{problem.sense} " if problem.free else ""  # without free parameters, nothing is minimized
+    objective_text = f"{sense}{text.strip()}" + (f" = {value}" if math.isfinite(solution.value) else "") if text else ""
+    verdict = "; ".join(part for part in (describe_status(solution), describe_verdict(solution)) if part)
     structure = structure_line(problem, solution.structure, solution.abscissa, solution.meetings)
     structure += ROUNDED if solution.multiple_as_rounded else ""
-    found = "; ".join(part for part in (located, asked, abscissa_as_stored(solution), structure) if part)
-    return Sentence(ended, tone=judge_tone(solution)), Sentence(found, tone="answer")
+    facts = "; ".join(part for part in (located, objective_text, abscissa_as_stored(solution), structure) if part)
+    return Sentence(verdict, tone=judge_tone(solution)), Sentence(facts, tone="answer")
 
 
 def judge_tone(solution: Solution) -> Tone:
@@ -172,21 +172,21 @@ def judge_tone(solution: Solution) -> Tone:
 
 
 def _write_answer(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Parts:
-    ended, asked = write_headline(solution)
+    verdict, facts = write_headline(solution)
     obstacles, further = analysis.obstacles
     if solution.status == "infeasible":
-        joined = ": " not in ended.text and obstacles
-        yield Sentence(f"{ended.text}: {obstacles[0]}" if joined else ended.text, tone="bad")
-        yield from obstacles[1:] if joined else obstacles
+        is_joined = ": " not in verdict.text and obstacles
+        yield Sentence(f"{verdict.text}: {obstacles[0]}" if is_joined else verdict.text, tone="bad")
+        yield from obstacles[1:] if is_joined else obstacles
         for name, value in solution.violations.items():
             unit = unit_of(solution.problem.posed, name)
-            by = f" by {unit.show(value, 4)}" if math.isfinite(value) else ", which has no value"
-            by = "" if name in _OTHER else by
-            yield Sentence(f"{name} ({_describe_limit(solution, name)}){by}", "violated")
-        yield Sentence(asked.text, "nearest design")
+            excess = f" by {unit.show(value, 4)}" if math.isfinite(value) else ", which has no value"
+            excess = "" if name in _OTHER else excess
+            yield Sentence(f"{name} ({_describe_limit(solution, name)}){excess}", "violated")
+        yield Sentence(facts.text, "nearest design")
     else:
-        yield ended
-        yield asked
+        yield verdict
+        yield facts
         yield from obstacles
     yield from further if full else ()
     yield Sentence(proof_line(solution), "proof")
@@ -200,18 +200,19 @@ def _describe_limit(solution: Solution, name: str) -> str:
     return limit_text(problem, name) or ("pattern" if name in problem.located else _OTHER.get(name, ""))
 
 
-def _write_design(solution: Solution, si: Numbers, brief: bool, scaled: bool) -> Parts:
-    """Free parameters side by side where they are many, and the fixed ones in a sentence; or all in a table."""
+def _write_design(solution: Solution, si: Numbers, brief: bool, shows_si: bool) -> Parts:
+    """Write all parameters in a table; if brief, the free ones side by side and the fixed ones in a sentence."""
     if not brief:
         yield tabulate_parameters(solution, si)
         return
     listed = [*list_parameters(solution, si, brief=True)]
-    rows = [(name, cell, also if scaled else "") for name, cell, role, also, _ in listed if role == "free"]
+    rows = [(name, cell, also if shows_si else "") for name, cell, role, also, _ in listed if role == "free"]
     if rows:
         yield TableBlock((("", "", ""), *rows), fold=_FOLD, tone="answer")
-    rest = [f"{name} = {cell}" for name, cell, role, *_ in listed if role == "fixed"]
-    more = f", and {len(rest) - _FIXED} more parameters" if len(rest) > _FIXED else ""
-    yield Sentence(", ".join(rest[:_FIXED]) + more, "fixed", "dim")
+    fixed_parameters = [f"{name} = {cell}" for name, cell, role, *_ in listed if role == "fixed"]
+    excess = len(fixed_parameters) - _MAX_FIXED
+    remainder = f", and {excess} more parameters" if excess > 0 else ""
+    yield Sentence(", ".join(fixed_parameters[:_MAX_FIXED]) + remainder, "fixed", "dim")
 
 
 def _write_motion(solution: Solution, analysis: Analysis, brief: bool) -> Parts:
@@ -231,45 +232,50 @@ def _write_motion(solution: Solution, analysis: Analysis, brief: bool) -> Parts:
 
 
 def _write_cases(solution: Solution, worst: Case) -> Parts:
-    """The worst case, and what is known of all of them."""
-    of, cover, damped, fastest = solution.problem, solution.cover, solution.least_damped, solution.fastest
-    yield Sentence(f"{_describe_case(of, worst)}; motion and roots are of this case, all else is nominal", "worst case")
-    if damped not in (None, worst) and of.model.carrier is None:
-        label = "least damped case found" if of.tolerances else "least damped case"
-        yield Sentence(f"{_describe_case(of, damped)}; the damping ratio is of this case", label)
+    """Write the worst case, other extreme cases, and a bound for all cases."""
+    problem, cover, least_damped, fastest = solution.problem, solution.cover, solution.least_damped, solution.fastest
+    yield Sentence(
+        f"{_describe_case(problem, worst)}; motion and roots belong to this case, all else to the nominal design",
+        "worst case",
+    )
+    if least_damped not in (None, worst) and problem.model.carrier is None:
+        label = "least damped case found" if problem.tolerances else "least damped case"
+        yield Sentence(f"{_describe_case(problem, least_damped)}; the damping ratio belongs to this case", label)
     if fastest not in (None, worst):
-        yield Sentence(f"{_describe_case(of, fastest)}; limits on the frequency apply to this case", "fastest case")
+        yield Sentence(
+            f"{_describe_case(problem, fastest)}; limits on the frequency apply to this case", "fastest case"
+        )
     if cover is not None:
-        means = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "by a search, not proved"
-        unit = common_unit(of.posed, "abscissa")
-        yield Sentence(f"abscissa at most {Cell(cover.limit, unit, named=True)}, {means}", "every case")
+        method = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "by a search, not proved"
+        unit = common_unit(problem.posed, "abscissa")
+        yield Sentence(f"abscissa at most {Cell(cover.limit, unit, with_unit=True)}, {method}", "every case")
 
 
-def _describe_case(of: Problem, case: Case) -> str:
-    """Values of scenarios and errors of parameters in a case."""
-    problem = of.posed
-    at = [f"{n} = {unit_of(problem, n).show(v, 6)}" for n, v in case.at.items()]
-    at += [f"{n} {'+' if v >= 0 else '−'} {unit_of(problem, n).show(abs(v), 6)}" for n, v in case.offset.items()]
-    return ", ".join(at)
+def _describe_case(problem: Problem, case: Case) -> str:
+    """Write the values of scenarios and the errors of parameters in a case."""
+    posed = problem.posed
+    texts = [f"{n} = {unit_of(posed, n).show(v, 6)}" for n, v in case.at.items()]
+    texts += [f"{n} {'+' if v >= 0 else '−'} {unit_of(posed, n).show(abs(v), 6)}" for n, v in case.offset.items()]
+    return ", ".join(texts)
 
 
-def _write_limits(solution: Solution, found: Explanation | None, full: bool, page: bool) -> Parts:
+def _write_limits(solution: Solution, explanation: Explanation | None, full: bool, page: bool) -> Parts:
     names = dict.fromkeys((*solution.problem.constraints, *solution.violations))
     if page and names:
         rows = ((n, _describe_limit(solution, n), _describe_standing(solution, n)) for n in names)
-        yield TableBlock((("limit", "says", "stands"), *rows), "Limits, and how they stand")
-    if found is None:
+        yield TableBlock((("limit", "condition", "status"), *rows), "Limits and their status")
+    if explanation is None:
         return
-    if found.levers:
+    if explanation.levers:
         head = ("active limit", "value", "if relaxed by", "improvement (first order)")
-        worth = (_list_lever(solution, lever) for lever in found.levers)
-        yield TableBlock((head, *worth), "What the active limits are worth", most=_LIMITS)
-        yield from (lever.sentence for lever in found.levers if full)
-    yield from (Sentence(text, "warning", "doubt") for text in found.warnings)
+        lever_rows = (_list_lever(solution, lever) for lever in explanation.levers)
+        yield TableBlock((head, *lever_rows), "Effect of the active limits", max_rows=_MAX_LIMITS)
+        yield from (lever.sentence for lever in explanation.levers if full)
+    yield from (Sentence(text, "warning", "doubt") for text in explanation.warnings)
 
 
 def _describe_standing(solution: Solution, name: str) -> str:
-    """Whether a limit holds, is active or is violated."""
+    """Describe whether a limit holds, is active or is violated."""
     if name in solution.violations:
         by, unit = solution.violations[name], unit_of(solution.problem.posed, name)
         return f"violated by {unit.show(by, 4)}" if math.isfinite(by) else "has no value"
@@ -277,12 +283,13 @@ def _describe_standing(solution: Solution, name: str) -> str:
 
 
 def _describe_margin(solution: Solution, name: str) -> str:
-    """By how much an inequality holds, the least over the cases of the design; empty where that is no number."""
+    """Write the smallest margin of an inequality over all cases of the design; empty if it is not finite."""
     problem, condition = solution.problem.posed, solution.problem.posed.conditions[name]
     if condition.equality:
         return ""
-    radius = {n: x for n, x in solution.quantities.items() if n == NO_RADIUS.name}  # the search for it is over
-    left = min(
+    # the radius is not computed again, because it needs a search
+    radius = {n: x for n, x in solution.quantities.items() if n == NO_RADIUS.name}
+    margin = min(
         -condition.sign * float(condition(problem.values(case.applied(solution.parameters)).with_known(radius)))
         for case in list_cases(solution) or [Case()]
     )
@@ -290,31 +297,31 @@ def _describe_margin(solution: Solution, name: str) -> str:
     unit = unit_of(problem, name)
     if not unit.text and any(q.share and q.name in condition.names for q in quantities):
         unit = PERCENT
-    return f" by {unit.show(left, 4)}" if math.isfinite(left) else ""
+    return f" by {unit.show(margin, 4)}" if math.isfinite(margin) else ""
 
 
 def _list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
-    """An active limit: its name, what it says, a small move of it, and what that buys to first order."""
+    """List name and text of an active limit, a small relaxation of it, and the improvement to first order."""
     limit = limit_text(solution.problem.posed, lever.name)
     if not lever.step:
-        return lever.name, limit, "a physical end", ""
+        return lever.name, limit, "a physical limit", ""
     step = unit_of(solution.problem.posed, lever.name).show(abs(lever.step), 4)
     return lever.name, limit, step, lever.gained.show(lever.predicted, 3)
 
 
-def _write_sureness(solution: Solution, found: Explanation | None, brief: bool, full: bool) -> Parts:
-    robust = solution.analysis.boundaries if full else solution.analysis.robustness
-    if robust is not None:
-        yield Sentence(describe_robustness(robust, solution.stability.on_edge), "robustness")
+def _write_sureness(solution: Solution, explanation: Explanation | None, brief: bool, full: bool) -> Parts:
+    robustness = solution.analysis.boundaries if full else solution.analysis.robustness
+    if robustness is not None:
+        yield Sentence(describe_robustness(robustness, solution.stability.on_edge), "robustness")
         if full:
-            yield tabulate_boundaries(robust)
-    if found is not None and found.precision:
-        yield Sentence(describe_rounding(found), "rounding")
+            yield tabulate_boundaries(robustness)
+    if explanation is not None and explanation.precision:
+        yield Sentence(describe_rounding(explanation), "rounding")
         if not brief:
-            yield tabulate_rounding(found)
+            yield tabulate_rounding(explanation)
     if not brief:
         yield from bound_lines(solution)
-        yield from write_optimality(found.optimality) if found else ()
+        yield from write_optimality(explanation.optimality) if explanation else ()
 
 
 def _write_search(solution: Solution) -> Parts:
@@ -324,23 +331,27 @@ def _write_search(solution: Solution) -> Parts:
         yield Sentence(f"{free.kind}, {parameters} and {conditions}", "freedom")
     yield from list_branches(solution)
     if starts.tried:
-        led = starts.tried - starts.runs
-        also = f" ({led} skipped, because they lead to a known optimum)" if starts.runs and led else ""
-        sampled = f"; sample of {starts.looked} designs" if starts.looked else ""
-        tried = f"{starts.tried}{also}, {starts.converged} converged, {starts.at_best} reached the best design"
-        yield Sentence(f"{tried}{sampled}; {solution.seconds:.2f} s", "starts")
+        skipped_count = starts.tried - starts.runs
+        skipped_text = (
+            f" ({skipped_count} skipped, because they lead to a known optimum)" if starts.runs and skipped_count else ""
+        )
+        sample_text = f"; sample of {starts.looked} designs" if starts.looked else ""
+        count_text = (
+            f"{starts.tried}{skipped_text}, {starts.converged} converged, {starts.at_best} reached the best design"
+        )
+        yield Sentence(f"{count_text}{sample_text}; {solution.seconds:.2f} s", "starts")
 
 
 def list_branches(solution: Solution) -> Iterator[str]:
-    """Other designs that solve the same equations, and what excludes them."""
+    """List other designs that solve the same equations, and the limits that exclude them."""
     problem = solution.problem.posed
     for branch in solution.branches:
-        where = ", ".join(f"{n} = {unit_of(problem, n).show(branch.parameters[n], ALL)}" for n in problem.free)
+        where = ", ".join(f"{n} = {unit_of(problem, n).show(branch.parameters[n], ALL_DIGITS)}" for n in problem.free)
         yield f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}"
 
 
 def _suggest_more(solution: Solution, analysis: Analysis) -> Sentence:
-    """How to see more, and the commands that have something to say of the same file."""
+    """Suggest --full, and the commands that apply to the same file."""
     problem, solved = solution.problem.posed, solution.status == "optimal"
     commands = {
         "prove": solved,
@@ -349,7 +360,9 @@ def _suggest_more(solution: Solution, analysis: Analysis) -> Sentence:
         "chart": len(problem.free) in (2, 3),
         "trace": bool(problem.locate) and solution.freedom.count == 1,
     }
-    named = ", ".join(name for name, answers in commands.items() if answers)
+    command_names = ", ".join(name for name, applies in commands.items() if applies)
     return Sentence(
-        f"--full prints everything; tmsopt {named} with the same file" if named else "--full", "more", "dim"
+        f"--full prints everything; tmsopt {command_names} with the same file" if command_names else "--full",
+        "more",
+        "dim",
     )

@@ -1,7 +1,7 @@
-"""Finding one's way: what a model or file is made of, the shape of files for editors, files to start from.
+"""Guides for users: descriptions of models and files, the JSON Schema of files for editors, and example files.
 
 In: a model, a problem, a file, or the name of an example. Out: a `Description`, a JSON Schema, texts of files. Open
-`describing` first: what is said of a model.
+`describing` first: it describes a model.
 """
 
 import lazy_loader

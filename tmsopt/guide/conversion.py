@@ -1,4 +1,4 @@
-"""A problem for point masses on skates as one for Whipple's bicycle, whose bodies have rotational inertia."""
+"""Converts a problem of point masses on skates to Whipple's bicycle, whose bodies have rotational inertia."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -13,15 +13,18 @@ from tmsopt.problem.files import Given, pose
 from tmsopt.problem.units import parse_quantity
 
 INERTIAS = ("boxes", "none")
-"""What a body becomes: a solid box about its centre of mass, or the point mass that it was."""
+"""What a point mass becomes: a solid box around its centre of mass, or again a point mass."""
 
 _PER_WHEELBASE = {"B": (1 / 2, 1 / 4, 3 / 8), "H": (1 / 8, 1 / 8, 3 / 8)}
-"""Body → length, width and height of its box, per wheelbase, unless its size is given."""
+"""Body → default length, width and height of its box, divided by the wheelbase."""
 
-_INSIDE = 0.9
-"""Share of the range of an inertia that an equality ties to a mass, so that the ends of the mass are active first."""
+_INERTIA_SHARE = 0.9
+"""Widens the range of an inertia that follows from a mass: its low end times this, its high end divided by it.
 
-_WORDS = {
+So the limits of the mass become active first.
+"""
+
+_COUNTERPARTS = {
     "Fr": "(v/sqrt(g*w))",
     "mu": "(m_H/m_B)",
     "chi_B": "(x_B/w)",
@@ -38,7 +41,7 @@ _WORDS = {
     "Fr_c": "(v_weave/sqrt(g*w))",
     **{n: n for n in ("damping_ratio", "radius", "load_front", "load_rear", *FUNCTIONS, *CONSTANTS)},
 }
-"""Word of an expression about point masses → the same in Whipple's model; those in SI alone are the same."""
+"""Name in an expression about point masses → the same quantity in Whipple's model. SI parameters keep their names."""
 
 _SIZE = re.compile(r"\s*([\d.]+)\s*[x×]\s*([\d.]+)\s*[x×]\s*([\d.]+)\s*(\D+)")
 
@@ -52,10 +55,10 @@ def convert(
     body: str | Size | None = None,
     front: str | Size | None = None,
 ) -> Problem:
-    """A problem of point masses on skates, in SI, as the same problem for a model whose bodies have inertia.
+    """Convert a problem of point masses on skates, in SI, to a model whose bodies have inertia.
 
-    Parameters, ranges, limits, cases and the objective are kept; there are no wheels and there is no trail. Where a
-    mass is free, the inertia of its box is free too, and an equality ties it to the mass.
+    Parameters, ranges, limits, cases and the objective stay the same; there are no wheels and no trail. If a mass is
+    free, the inertia of its box is free too, and an equality ties it to the mass.
 
     Args:
         given: a problem of the model ``tms``, the path of its file, or a solution.
@@ -63,10 +66,10 @@ def convert(
         inertia: ``boxes``: the rear frame and the front assembly are solid boxes; ``none``: they stay point masses.
         body: length, width and height of the rear frame in m, or as ``"40x20x30 cm"``. By default 1/2, 1/4 and 3/8 of
             the wheelbase, and no higher than twice the height of its centre of mass.
-        front: likewise of the front assembly; by default 1/8, 1/8 and 3/8.
+        front: the same for the front assembly; by default 1/8, 1/8 and 3/8.
 
     Raises:
-        InputError: naming all that has no counterpart in the other model.
+        InputError: if something has no counterpart in the other model; the error names all of it.
 
     Example:
         >>> robot = tmsopt.convert("problems/point_mass_robot.toml", body="40x20x30 cm")
@@ -76,25 +79,25 @@ def convert(
     More: docs/how_to/inertia.md
     """
     problem = pose(given)
-    if faults := [*_not_taken(problem, to, inertia)]:
+    if faults := [*_list_unconvertible(problem, to, inertia)]:
         raise InputError(faults)
-    sizes, faults = _sizes(problem, inertia, body, front), [*_without_counterpart(problem)]
-    for which in sizes:
-        if f"m_{which}" in problem.scenarios:
+    sizes, faults = _choose_sizes(problem, inertia, body, front), [*_list_missing_counterparts(problem)]
+    for letter in sizes:
+        if f"m_{letter}" in problem.scenarios:
             message = "varies, and the inertia of a box would vary with it; give it one value, or --inertia none"
-            faults.append(Fault(message, ("scenarios", f"m_{which}")))
+            faults.append(Fault(message, ("scenarios", f"m_{letter}")))
     if faults:
         raise InputError(faults)
     fixed, free = dict(problem.fixed), dict(problem.free)
     limits = {name: _translate(problem, text) for name, text in problem.constraints.items()}
-    for which, (length, width, height) in sizes.items():
-        mass = f"m_{which}"
+    for letter, (length, width, height) in sizes.items():
+        mass = f"m_{letter}"
         for axes, share in (("xx", (width**2 + height**2) / 12), ("zz", (length**2 + width**2) / 12)):  # m²
-            name = f"I_{which}{axes}"
+            name = f"I_{letter}{axes}"
             if mass in problem.free:
                 low, high = problem.free[mass]
-                free[name] = (_round(_INSIDE * share * low), _round(share * high / _INSIDE))
-                limits[_new(f"box_{name}", limits)] = f"{name} == {share:.12g}*{mass}"
+                free[name] = (_round(_INERTIA_SHARE * share * low), _round(share * high / _INERTIA_SHARE))
+                limits[_choose_new_name(f"box_{name}", limits)] = f"{name} == {share:.12g}*{mass}"
             else:
                 fixed[name] = _round(share * problem.fixed[mass])
     return replace(
@@ -103,25 +106,25 @@ def convert(
         fixed=fixed,
         free=free,
         constraints=limits,
-        minimize=_objective(problem, problem.minimize),
-        maximize=_objective(problem, problem.maximize),
-        pareto=tuple(str(_objective(problem, text)) for text in problem.pareto),
+        minimize=_translate_objective(problem, problem.minimize),
+        maximize=_translate_objective(problem, problem.maximize),
+        pareto=tuple(str(_translate_objective(problem, text)) for text in problem.pareto),
     )
 
 
 def converted_file(given: Given, **options: Any) -> str:
-    """The text of a converted problem file, with what was assumed in comments; options as of `convert`."""
+    """Write a converted problem file with comments on the assumptions; `options` are those of `convert`."""
     problem = pose(given)
-    converted, sizes = convert(problem, **options), _sizes(problem, **options)
+    converted, sizes = convert(problem, **options), _choose_sizes(problem, **options)
     lines = ["The two masses of the model tms in the model whipple, without wheels and trail."]
     for name, size in zip(("rear frame", "front assembly"), sizes.values(), strict=False):
-        shown = " x ".join(f"{100 * x:.4g}" for x in size)
-        lines.append(f"The {name} is a solid box of {shown} cm (length, width, height) about its centre of mass.")
+        size_text = " x ".join(f"{100 * x:.4g}" for x in size)
+        lines.append(f"The {name} is a solid box of {size_text} cm (length, width, height) about its centre of mass.")
     if sizes:
         lines.append("I_xx = m (width^2 + height^2)/12, I_zz = m (length^2 + width^2)/12, in kg m^2, and I_xz = 0.")
-    radius = 0.125 * _middle(problem, "w")
+    radius = 0.125 * _find_middle(problem, "w")
     lines += [
-        "A wheel of 1 kg, a solid disc, under [parameters]; likewise at the rear with R for F:",
+        "Example: a front wheel of 1 kg, a solid disc, under [parameters]; for the rear wheel, write R instead of F:",
         f"  r_F = {radius:.4g}",
         "  m_F = 1",
         f"  I_Fxx = {radius**2 / 4:.4g}    # m r^2/4 about a diameter",
@@ -130,13 +133,13 @@ def converted_file(given: Given, **options: Any) -> str:
     return toml_problem(converted.posed, lines)
 
 
-def _not_taken(problem: Posed, to: str, inertia: str) -> Iterator[Fault]:
-    """What cannot be converted at all."""
+def _list_unconvertible(problem: Posed, to: str, inertia: str) -> Iterator[Fault]:
+    """List faults for a model, a parameter set or an option that cannot be converted."""
     if problem.model.name != "tms":
         yield Fault(f"found the model {short(problem.model.name)}; accepted: tms", ("model",))
     elif problem.parameter_set.rate is None:
         names = ", ".join(problem.parameter_set.names[:3])
-        message = f"is written in numbers without units ({names}, …), and a body has a size and a mass"
+        message = f"uses numbers without units ({names}, …), but a body has a size and a mass"
         yield Fault(f"{message}; write it in SI: w, v, m_B, x_B, …", ("parameters",))
     if to != whipple.name:
         yield Fault(f"found {short(to)}; accepted: {whipple.name}", ("to",))
@@ -144,82 +147,82 @@ def _not_taken(problem: Posed, to: str, inertia: str) -> Iterator[Fault]:
         yield Fault(f"found {short(inertia)}; {suggest(inertia, INERTIAS)}", ("inertia",))
 
 
-def _without_counterpart(problem: Posed) -> Iterator[Fault]:
-    """Words of the objective and the constraints that Whipple's model does not have."""
+def _list_missing_counterparts(problem: Posed) -> Iterator[Fault]:
+    """List faults for names in the objective and the constraints that Whipple's model lacks."""
     objectives = {"minimize": problem.minimize, "maximize": problem.maximize, "pareto": " ".join(problem.pareto)}
-    asked = {("objective", sense): text or "" for sense, text in objectives.items()}
-    asked |= {("constraints", name): text for name, text in problem.constraints.items()}
-    for key, text in asked.items():
-        for name in sorted({*_WORD.findall(text)} - set(_counterparts(problem))):
+    expressions = {("objective", sense): text or "" for sense, text in objectives.items()}
+    expressions |= {("constraints", name): text for name, text in problem.constraints.items()}
+    for key, text in expressions.items():
+        for name in sorted({*_WORD.findall(text)} - set(_find_counterparts(problem))):
             yield Fault(f"{name} has no counterpart in the model whipple", key)
 
 
 _WORD = re.compile(r"\b[A-Za-z_]\w*")
 
 
-def _counterparts(problem: Posed) -> dict[str, str]:
-    """Word of an expression → what to write for it."""
-    of, other = problem.parameter_set, controlled(whipple, problem.parameter_set.names)
-    own = (*of.names, *(q.name for q in of.quantities))
-    theirs = {*other.sets[0].names, *other.quantity_names(other.sets[0])}
-    return {name: name for name in own if name in theirs} | _WORDS
+def _find_counterparts(problem: Posed) -> dict[str, str]:
+    """Return name in an expression → its replacement."""
+    parameter_set, bicycle = problem.parameter_set, controlled(whipple, problem.parameter_set.names)
+    names = (*parameter_set.names, *(q.name for q in parameter_set.quantities))
+    bicycle_names = {*bicycle.sets[0].names, *bicycle.quantity_names(bicycle.sets[0])}
+    return {name: name for name in names if name in bicycle_names} | _COUNTERPARTS
 
 
 def _translate(problem: Posed, text: str) -> str:
-    words = _counterparts(problem)
+    words = _find_counterparts(problem)
     return _WORD.sub(lambda word: words[word[0]], text)
 
 
-def _objective(problem: Posed, text: str | None) -> str | None:
-    """An objective; the abscissa alone stays as it is where √(g/w) is but a factor."""
+def _translate_objective(problem: Posed, text: str | None) -> str | None:
+    """Translate an objective; the abscissa alone stays unchanged if g and w, and so its factor √(g/w), are constant."""
     if text is None or (text.strip() == "abscissa" and not {"g", "w"} & {*problem.free, *problem.scenarios}):
         return text
     return _translate(problem, text)
 
 
-def _sizes(
+def _choose_sizes(
     problem: Posed,
     inertia: str = "boxes",
     body: str | Size | None = None,
     front: str | Size | None = None,
     **_options: str,
 ) -> dict[str, Size]:
-    """Body → length, width and height of its box; empty without boxes."""
-    found, faults = {}, []
-    for which, option, size in (("B", "body", body), ("H", "front", front)) if inertia == "boxes" else ():
+    """Return body → length, width and height of its box; empty without boxes."""
+    sizes, faults = {}, []
+    for letter, option, size in (("B", "body", body), ("H", "front", front)) if inertia == "boxes" else ():
         if size is None:
-            length, width, height = (share * _middle(problem, "w") for share in _PER_WHEELBASE[which])
-            centre = f"z_{which}"
-            least = -problem.free[centre][1] if centre in problem.free else -problem.fixed[centre]
-            found[which] = (_round(length), _round(width), _round(min(height, 2 * least)))
+            length, width, height = (share * _find_middle(problem, "w") for share in _PER_WHEELBASE[letter])
+            centre = f"z_{letter}"
+            centre_height = -problem.free[centre][1] if centre in problem.free else -problem.fixed[centre]
+            sizes[letter] = (_round(length), _round(width), _round(min(height, 2 * centre_height)))
         else:
             try:
-                found[which] = _size(size)
+                sizes[letter] = _parse_size(size)
             except ValueError as error:
                 faults.append(Fault(str(error), (option,)))
     if faults:
         raise InputError(faults)
-    return found
+    return sizes
 
 
-def _size(given: str | Size) -> Size:
-    """Three lengths in m.
+def _parse_size(size: str | Size) -> Size:
+    """Parse three lengths in m.
 
     Raises:
-        ValueError: for anything else.
+        ValueError: if `size` is not three positive lengths.
     """
     accepted = 'accepted: length, width and height, such as "40x20x30 cm"'
-    parts = _SIZE.fullmatch(given) if isinstance(given, str) else None
+    parts = _SIZE.fullmatch(size) if isinstance(size, str) else None
     try:
-        a, b, c = (parse_quantity(f"{x} {parts[4]}", "m") for x in parts.groups()[:3]) if parts else map(float, given)
+        a, b, c = (parse_quantity(f"{x} {parts[4]}", "m") for x in parts.groups()[:3]) if parts else map(float, size)
     except (TypeError, ValueError):
-        raise ValueError(f"found {short(given)}; {accepted}") from None
+        raise ValueError(f"found {short(size)}; {accepted}") from None
     if not all(0 < x < float("inf") for x in (a, b, c)):
-        raise ValueError(f"found {short(given)}; {accepted}, each more than 0")
+        raise ValueError(f"found {short(size)}; {accepted}, each more than 0")
     return a, b, c
 
 
-def _middle(problem: Posed, name: str) -> float:
+def _find_middle(problem: Posed, name: str) -> float:
     return sum(problem.free[name]) / 2 if name in problem.free else problem.fixed[name]
 
 
@@ -227,5 +230,5 @@ def _round(x: float) -> float:
     return float(f"{x:.6g}")
 
 
-def _new(name: str, taken: Mapping[str, str]) -> str:
-    return _new(f"{name}_", taken) if name in taken else name
+def _choose_new_name(name: str, names: Mapping[str, str]) -> str:
+    return _choose_new_name(f"{name}_", names) if name in names else name

@@ -1,4 +1,4 @@
-"""What a model, a problem or a file is made of, from the model's own tables."""
+"""Describes a model, a problem or a file by the tables of the model."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -19,14 +19,14 @@ from tmsopt.records import Table
 from tmsopt.studies import load_study
 
 Typed = Mapping[str, Any]
-"""The tables of a file as typed; empty for what is no file."""
+"""The tables of a file as typed; empty if there is no file."""
 
 
 def describe(given: Given | Model) -> Description:
-    """Words, units, signs and meanings of a model (by name too), a problem, a solution, or a problem or study file.
+    """Describe the names, units, signs and meanings of a model or its name, a problem, a solution, or a file.
 
     Raises:
-        InputError: for a file with faults, and for anything else.
+        InputError: for a file with faults, or if `given` is none of these.
 
     Example:
         >>> described = tmsopt.describe("problems/ep4.toml")
@@ -49,14 +49,14 @@ def describe(given: Given | Model) -> Description:
     except InputError as error:
         if "." in str(given) or len(error.faults) != 1:
             raise
-        (fault,) = error.faults  # of a word that is no file: it may be meant for a model
+        (fault,) = error.faults  # a word that is no file may be the misspelt name of a model
         message = f"{fault.message}; models: {' '.join(MODELS)}"
         raise InputError([replace(fault, message=message)]) from None
     return _describe(problem.model, problem.posed, typed)
 
 
 def _read(path: str | PathLike[str]) -> tuple[Problem, Typed]:
-    """The problem of a file, or the one that a study is of, with the tables in which it stands."""
+    """Read the problem of a problem file or study file, with its tables."""
     data = read_page(path, "problem").data
     if "parameters" in data or not {"problem", "study", "vary"} & set(data):
         return load(path), data
@@ -67,85 +67,92 @@ def _read(path: str | PathLike[str]) -> tuple[Problem, Typed]:
 
 
 def _describe(model: Model, problem: Posed | None = None, typed: Typed = Table()) -> Description:
-    stated = typed.get("model")
-    stated = stated if isinstance(stated, dict) else model.statement or {}
+    model_table = typed.get("model")
+    model_table = model_table if isinstance(model_table, dict) else model.statement or {}
     return Description(
         model=model.name,
         meaning=model.title,
         degree=model.degree if model.carrier is None else model.degree // 2,
         title=problem.title if problem else "",
-        sets=tuple(_words(model, of, problem, stated) for of in ([problem.parameter_set] if problem else model.sets)),
-        feedback=() if problem else tuple(_gains(model)),
+        sets=tuple(
+            _list_words(model, parameter_set, problem, model_table)
+            for parameter_set in ([problem.parameter_set] if problem else model.sets)
+        ),
+        feedback=() if problem else tuple(_list_gains(model)),
         patterns=Table({name: pattern_of(model, name).meaning for name in patterns_of(model)}),
         functions=(*FUNCTIONS, *CONSTANTS),
         omits=model.omits,
         conventions=model.conventions,
         sketch=model.sketch,
-        matrices=Table(dict(_matrices(stated))),
+        matrices=Table(dict(_list_matrices(model_table))),
         asked=Table(_list_question(problem, typed) if problem else {}),
     )
 
 
-def _words(model: Model, of: ParameterSet, problem: Posed | None, stated: Typed) -> Words:
-    written = stated.get("quantities", {})
-    quantities = [s for n, s in vocabulary(model, of).items() if n not in of.names]
+def _list_words(model: Model, parameter_set: ParameterSet, problem: Posed | None, model_table: Typed) -> Words:
+    expressions = model_table.get("quantities", {})
+    quantities = [s for n, s in vocabulary(model, parameter_set).items() if n not in parameter_set.names]
     return Words(
-        of.name,
-        tuple(_parameter(p, problem, model.statement is not None) for p in of.parameters),
-        tuple(Word(q.name, q.unit, f"= {written[q.name]}" if q.name in written else q.meaning) for q in quantities),
+        parameter_set.name,
+        tuple(_describe_parameter(p, problem, model.statement is not None) for p in parameter_set.parameters),
+        tuple(
+            Word(q.name, q.unit, f"= {expressions[q.name]}" if q.name in expressions else q.meaning) for q in quantities
+        ),
     )
 
 
-def _gains(model: Model) -> Iterator[Words]:
-    """What [feedback] adds to the sets of a bicycle."""
+def _list_gains(model: Model) -> Iterator[Words]:
+    """List the parameters and quantities that [feedback] adds to each parameter set of a bicycle."""
     if not gain_names(model.name):
         return
-    for of, more in zip(model.sets, controlled(model, gain_names(model.name)).sets, strict=True):
-        known = {q.name for q in of.quantities}
-        added = (_parameter(p) for p in more.parameters if p not in of.parameters)
-        quantities = (Word(q.name, q.unit, q.meaning) for q in more.quantities if q.name not in known)
-        yield Words(of.name, tuple(added), tuple(quantities))
+    for parameter_set, controlled_set in zip(model.sets, controlled(model, gain_names(model.name)).sets, strict=True):
+        names = {q.name for q in parameter_set.quantities}
+        gains = (_describe_parameter(p) for p in controlled_set.parameters if p not in parameter_set.parameters)
+        quantities = (Word(q.name, q.unit, q.meaning) for q in controlled_set.quantities if q.name not in names)
+        yield Words(parameter_set.name, tuple(gains), tuple(quantities))
 
 
-def _parameter(p: Parameter, problem: Posed | None = None, of_user: bool = False) -> Word:
-    """Its meaning, its physical range in words, angles in degrees, and what it is or may be, in the unit as typed."""
-    possible = "" if p.range == Range() else str(p.range)
-    if possible and p.unit == "rad":
-        possible = f"{Range(math.degrees(p.range.lower), math.degrees(p.range.upper), p.range.closed)} deg"
-    given = "" if p.default is None else f"{p.default:.12g} if left out"
+def _describe_parameter(p: Parameter, problem: Posed | None = None, is_user_model: bool = False) -> Word:
+    """Describe a parameter: its meaning, its possible range (angles in degrees), and its value or bounds as typed."""
+    range_text = "" if p.range == Range() else str(p.range)
+    if range_text and p.unit == "rad":
+        range_text = f"{Range(math.degrees(p.range.lower), math.degrees(p.range.upper), p.range.closed)} deg"
+    value_text = "" if p.default is None else f"{p.default:.12g} if left out"
     if problem is not None:
         values = problem.free.get(p.name) or (problem.fixed[p.name],)
-        given = " … ".join(_number(x, unit_of(problem, p.name)) for x in values)
-    return Word(p.name, p.unit, "" if of_user else p.meaning, possible, given)
+        value_text = " … ".join(_format_number(x, unit_of(problem, p.name)) for x in values)
+    return Word(p.name, p.unit, "" if is_user_model else p.meaning, range_text, value_text)
 
 
-def _number(value: Any, unit: Unit) -> str:
-    """A text as typed, or a number with its unit."""
+def _format_number(value: Any, unit: Unit) -> str:
+    """Return a text unchanged, or write a number with its unit."""
     return value if isinstance(value, str) else unit.show(value, 12)
 
 
-def _matrices(stated: Typed) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:
-    for name, rows in stated.items():
+def _list_matrices(model_table: Typed) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:
+    for name, rows in model_table.items():
         if isinstance(rows, list) and name not in ("parameters", "shared"):
             listed = rows if all(isinstance(row, list) for row in rows) else [rows]
             yield name, tuple(tuple(map(str, row)) for row in listed)
 
 
 def _list_question(problem: Posed, typed: Typed) -> dict[str, Table[str]]:
-    """What a problem asks, section by section."""
+    """List the question of a problem, section by section."""
     senses = {n: getattr(problem, n) or "" for n in ("locate", "minimize", "maximize")}
     objective = {"pareto": ", ".join(problem.pareto)} if problem.pareto else {n: t for n, t in senses.items() if t}
-    found: dict[str, dict[str, str]] = {"objective": objective, "constraints": dict(problem.constraints)}
+    sections: dict[str, dict[str, str]] = {"objective": objective, "constraints": dict(problem.constraints)}
     for section in ("scenarios", "tolerances", "weights"):
-        own = typed.get(section, {})
-        found[section] = {n: _span(own.get(n, v), unit_of(problem, n)) for n, v in getattr(problem, section).items()}
-    return {section: Table(keys) for section, keys in found.items() if keys}
+        typed_values = typed.get(section, {})
+        sections[section] = {
+            n: _format_span(typed_values.get(n, v), unit_of(problem, n)) for n, v in getattr(problem, section).items()
+        }
+    return {section: Table(keys) for section, keys in sections.items() if keys}
 
 
-def _span(value: Any, unit: Unit) -> str:
-    """A scenario, a tolerance or a weight."""
+def _format_span(value: Any, unit: Unit) -> str:
+    """Write a scenario, a tolerance or a weight."""
     if isinstance(value, Band):
         value = {"min": value.min, "max": value.max}
     if isinstance(value, dict):
-        return f"{_number(value['min'], unit)} … {_number(value['max'], unit)}"
-    return ", ".join(_number(v, unit) for v in (value if isinstance(value, list | tuple) else [value]))
+        return f"{_format_number(value['min'], unit)} … {_format_number(value['max'], unit)}"
+    return ", ".join(_format_number(v, unit) for v in (value if isinstance(value, list | tuple) else [value]))

@@ -13,9 +13,9 @@ class Word:
     """A parameter or quantity.
 
     Attributes:
-        unit: of its numbers; empty where it has none.
+        unit: unit of its numbers; empty if it has none.
         range: physically possible values of a parameter, such as ``> 0``.
-        given: of a problem, the value or the bounds, in the unit in which they were typed; of a model, the default.
+        given: in a problem, the value or the bounds with the unit as typed; in a model, the default.
     """
 
     name: str
@@ -27,11 +27,11 @@ class Word:
 
 @dataclass(frozen=True)
 class Words:
-    """What may be written in one of the ways to state a design.
+    """The names of one parameter set, which is one way to state a design.
 
     Attributes:
-        name: e.g. ``SI``.
-        quantities: all that an expression may use beside the parameters.
+        name: name of the set, such as ``SI``.
+        quantities: further names that an expression may use.
     """
 
     name: str
@@ -41,20 +41,21 @@ class Words:
 
 @dataclass(frozen=True, repr=False)
 class Description(Printable):
-    """What a model is made of, or a problem.
+    """A model, or a problem, in names and their meanings.
 
     Attributes:
-        model: its name, and `meaning` what it is.
-        title: of a problem; else empty.
-        sets: of a problem, the one in which it is written.
+        model: name of the model.
+        meaning: title of the model.
+        title: title of a problem; otherwise empty.
+        sets: the parameter sets of the model, or the one that the problem uses.
         patterns: name of a root pattern that can be located → meaning.
-        functions: of expressions.
-        omits: what the model leaves out, for a builder; empty where nothing need be said.
+        functions: functions and constants of expressions.
+        omits: what the model leaves out, as a warning to builders; may be empty.
         conventions: sentences on signs.
         sketch: side view of a bicycle; empty for other systems.
-        matrices: of a stated system, M, D, K, A or coefficients → rows of entries.
-        asked: of a problem, section → key → text.
-        feedback: of a bicycle, what [feedback] adds to each of its sets.
+        matrices: M, D, K, A or coefficients of a user's system → rows of entries.
+        asked: section of a problem → key → text.
+        feedback: what [feedback] adds to each parameter set of a bicycle.
 
     Example:
         >>> tmsopt.describe("tms").patterns["EP4"]

@@ -1,4 +1,4 @@
-"""Files to start from: the examples that come with tmsopt, and new problems with a comment at each line."""
+"""Files to start from: the examples that come with tmsopt, and new problems with a comment on each line."""
 
 import json
 import tomllib
@@ -12,20 +12,20 @@ from tmsopt.errors import input_error, suggest
 from tmsopt.guide.schema import schema
 
 SCHEMA_FILE = "tmsopt.schema.json"
-"""What the first line of each file refers to, beside it."""
+"""Name of the schema file. The first line of each problem file refers to it, in the same folder."""
 
-_INSTALLED = "share/tmsopt/problems"  # as pyproject.toml says
+_INSTALLED_FOLDER = "share/tmsopt/problems"  # the same as in pyproject.toml
 
 STARTS = {
     "tms": "an engineer's bicycle or robot on two wheels, as two masses on skates, in SI units",
     "whipple": "a bicycle with wheels and trail, in SI units",
     "own": "a system of your own, by its matrices",
 }
-"""Models of new problems → what each is."""
+"""Model of a new problem → its meaning."""
 
 
 def new_problem(model: str = "tms") -> str:
-    """A problem file to start from, which solves as it stands.
+    """Return a problem file to start from. It can be solved without changes.
 
     Raises:
         InputError: unless `model` is one of `STARTS`.
@@ -36,47 +36,50 @@ def new_problem(model: str = "tms") -> str:
 
 
 def examples() -> dict[str, str]:
-    """The examples that come with tmsopt: name → title."""
-    return {name: str(tomllib.loads(example(name)).get("title", "")) for name in _files()}
+    """List the examples that come with tmsopt: name → title."""
+    return {name: str(tomllib.loads(example(name)).get("title", "")) for name in _find_files()}
 
 
 def example(name: str) -> str:
-    """The text of an example.
+    """Return the text of an example.
 
     Raises:
-        InputError: for a name that is none.
+        InputError: if no example has this name.
     """
-    stem, found = name.removesuffix(".toml"), _files()
-    if stem not in found:
-        raise input_error(f"found '{name}'; {suggest(stem, found)}", "name")
-    return found[stem].read_text(encoding="utf-8")
+    stem, paths = name.removesuffix(".toml"), _find_files()
+    if stem not in paths:
+        raise input_error(f"found '{name}'; {suggest(stem, paths)}", "name")
+    return paths[stem].read_text(encoding="utf-8")
 
 
 def companions(text: str) -> dict[str, str]:
-    """Files that belong beside a problem or study file: name → text.
+    """Return name → text of the files that must be in the folder of a problem or study file.
 
-    The schema; a problem that a study names; where a problem names a bicycle, all that come with tmsopt.
+    These are the schema, the problem that a study names, and, if a problem names a bicycle, all bicycles of tmsopt.
     """
     data = tomllib.loads(text)
     problem = data.get("problem")
-    named = {problem: example(problem)} if isinstance(problem, str) else {}
-    bicycles = next(iter(_files().values())).parent.glob("bicycles/*.txt") if "bicycle" in data else ()
-    ridden = {f"bicycles/{path.name}": path.read_text(encoding="utf-8") for path in sorted(bicycles)}
-    return {SCHEMA_FILE: schema_text(), **named, **ridden}
+    problems = {problem: example(problem)} if isinstance(problem, str) else {}
+    bicycles = next(iter(_find_files().values())).parent.glob("bicycles/*.txt") if "bicycle" in data else ()
+    bicycle_files = {f"bicycles/{path.name}": path.read_text(encoding="utf-8") for path in sorted(bicycles)}
+    return {SCHEMA_FILE: schema_text(), **problems, **bicycle_files}
 
 
 def schema_text() -> str:
-    """The JSON Schema as it is written to files."""
+    """Write the JSON Schema as the text of a file."""
     return json.dumps(schema(), indent=1, ensure_ascii=False) + "\n"
 
 
 @cache
-def _files() -> Mapping[str, Path]:
-    """The files of the examples: those of a checkout, or those that were installed with the package."""
+def _find_files() -> Mapping[str, Path]:
+    """Find the files of the examples, in the source repository or installed with the package."""
     above = Path(__file__).parents[2]
-    checkout, beside = above / "problems", above / _INSTALLED
-    found = [*(checkout if (checkout / SCHEMA_FILE).is_file() else beside).glob("*.toml")]  # pip install --target
-    if not found:
+    checkout, installed_folder = above / "problems", above / _INSTALLED_FOLDER
+    folder = checkout if (checkout / SCHEMA_FILE).is_file() else installed_folder  # pip install --target
+    paths = [*folder.glob("*.toml")]
+    if not paths:
         listed = metadata.files("tmsopt") or []
-        found = [Path(str(f.locate())) for f in listed if str(f.parent).endswith(_INSTALLED) and f.suffix == ".toml"]
-    return {path.stem: path for path in sorted(found)}
+        paths = [
+            Path(str(f.locate())) for f in listed if str(f.parent).endswith(_INSTALLED_FOLDER) and f.suffix == ".toml"
+        ]
+    return {path.stem: path for path in sorted(paths)}

@@ -1,4 +1,4 @@
-"""A problem as the text of a problem file, in the units in which it was typed."""
+"""Writes a problem as the text of a problem file, in the units as typed."""
 
 import json
 import math
@@ -14,25 +14,25 @@ from tmsopt.problem.cases import middle_of
 from tmsopt.problem.units import parse_quantity, unit_factor
 from tmsopt.problem.units.text import parse_exact_quantity
 
-_LARGEST_DENOMINATOR = 10**6  # of a factor between units, such as 5/18
-_PLACES = 22  # of a decimal that only one double is nearest to, in any unit
+_LARGEST_DENOMINATOR = 10**6  # bound for factors between units, such as 5/18
+_PLACES = 22  # digits with which a decimal in any unit determines one double
 
 
 def toml_problem(problem: Posed, comments: Iterable[str] = ()) -> str:
-    """A file that is read as the same problem, of one of the bicycles.
+    """Write the problem file of a bicycle problem; reading it gives the same problem.
 
     Args:
-        comments: lines to begin with.
+        comments: comment lines at the beginning.
     """
     gains, senses = gain_names(problem.model.name), ("locate", "minimize", "maximize", "pareto")
     tables: dict[str, dict[str, str]] = {"parameters": {}, "feedback": {}}
     for p in problem.parameter_set.parameters:
         if _is_written(problem, p):
-            tables["feedback" if p.name in gains else "parameters"][p.name] = _row(problem, p)
+            tables["feedback" if p.name in gains else "parameters"][p.name] = _format_row(problem, p)
     tables["objective"] = {sense: toml_text(text) for sense in senses if (text := getattr(problem, sense))}
     tables["constraints"] = {name: toml_text(text) for name, text in problem.constraints.items()}
     for table in ("scenarios", "tolerances", "weights"):
-        tables[table] = {name: _value(problem, name, value) for name, value in getattr(problem, table).items()}
+        tables[table] = {name: _format_value(problem, name, value) for name, value in getattr(problem, table).items()}
     lines = ["#:schema ./tmsopt.schema.json", *(f"# {comment}" for comment in comments)]
     lines += [f"title = {toml_text(problem.title)}", f"model = {toml_text(problem.model.name)}"]
     for table, entries in tables.items():
@@ -42,65 +42,65 @@ def toml_problem(problem: Posed, comments: Iterable[str] = ()) -> str:
 
 
 def toml_text(value: object) -> str:
-    """A text, a number, a truth or a list of these as TOML: JSON has the same signs and escapes."""
+    """Write a text, a number, a truth value or a list of these as TOML, whose signs and escapes are those of JSON."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
 
 
 def toml_key(name: str) -> str:
-    """A name as a key of TOML."""
+    """Write a name as a key of TOML."""
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml_text(name)
 
 
-def exact_value(value: float, written: str, own: str) -> str:
-    """A parameter's value in TOML, in the unit that it was written in where that gives back the same double.
+def exact_value(value: float, typed_unit: str, stored_unit: str) -> str:
+    """Write a value in TOML, in the typed unit if reading it back gives the same double.
 
     Args:
-        written, own: the unit as written, and the one that the value is kept in.
+        typed_unit, stored_unit: the unit as typed, and the unit of `value`.
     """
-    if not written:
+    if not typed_unit:
         return repr(value)
-    one = unit_factor(written, own)
-    share = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR)
+    factor = unit_factor(typed_unit, stored_unit)
+    fraction = Fraction(factor).limit_denominator(_LARGEST_DENOMINATOR)
     with localcontext(prec=_PLACES):
-        long = str(Decimal(repr(value)) * share.denominator / share.numerator)
-    near = value / one
-    beside = (repr(near + k * math.ulp(near)).removesuffix(".0") for k in (0, 1, -1, 2, -2))
-    texts = (f"{number} {written}" for number in (*beside, long))
-    return next((toml_text(text) for text in texts if parse_quantity(text, own) == value), repr(value))
+        decimal = str(Decimal(repr(value)) * fraction.denominator / fraction.numerator)
+    quotient = value / factor
+    neighbours = (repr(quotient + k * math.ulp(quotient)).removesuffix(".0") for k in (0, 1, -1, 2, -2))
+    texts = (f"{number} {typed_unit}" for number in (*neighbours, decimal))
+    return next((toml_text(text) for text in texts if parse_quantity(text, stored_unit) == value), repr(value))
 
 
 def _is_written(problem: Posed, parameter: Parameter) -> bool:
-    """Whether a parameter must be in the file: no default, nor the middle of a scenario."""
+    """Return whether a parameter must be in the file: its value is neither the default nor the middle of a scenario."""
     name, varied = parameter.name, problem.scenarios.get(parameter.name)
     default = parameter.default if varied is None else middle_of(varied)
     return name in problem.free or problem.fixed[name] != default
 
 
-def _row(problem: Posed, parameter: Parameter) -> str:
+def _format_row(problem: Posed, parameter: Parameter) -> str:
     name = parameter.name
     comment = f"# {parameter.meaning}" + ("" if name in problem.units else f", {parameter.unit}")
     value: Any = problem.fixed.get(name)
     if name in problem.free:
         value = dict(zip(("min", "max"), problem.free[name], strict=True))
         value |= {"start": problem.start[name]} if name in problem.start else {}
-    return f"{_value(problem, name, value)}  {comment}"
+    return f"{_format_value(problem, name, value)}  {comment}"
 
 
-def _value(problem: Posed, name: str, value: Any) -> str:
-    """A number, a list of numbers, or a table of them."""
+def _format_value(problem: Posed, name: str, value: Any) -> str:
+    """Write a number, a list of numbers, or a table of numbers."""
     if isinstance(value, Band):
-        return f"{_value(problem, name, {'min': value.min, 'max': value.max})[:-2]}, points = {value.points} }}"
+        return f"{_format_value(problem, name, {'min': value.min, 'max': value.max})[:-2]}, points = {value.points} }}"
     if isinstance(value, tuple):
-        return f"[{', '.join(_number(problem, name, x) for x in value)}]"
+        return f"[{', '.join(_format_number(problem, name, x) for x in value)}]"
     if isinstance(value, dict):
-        return f"{{ {', '.join(f'{end} = {_number(problem, name, x)}' for end, x in value.items())} }}"
-    return _number(problem, name, value)
+        return f"{{ {', '.join(f'{end} = {_format_number(problem, name, x)}' for end, x in value.items())} }}"
+    return _format_number(problem, name, value)
 
 
-def _number(problem: Posed, name: str, value: float) -> str:
-    """As it was typed, where it is exactly that number; in the unit of the file if it reads back so."""
-    kept, typed = problem.parameter_set[name].unit, problem.typed({name: value}).get(name, "")
-    text = exact_value(value, problem.units.get(name, ""), kept)
-    if typed and (text[0] != '"' or str(parse_exact_quantity(text[1:-1], kept)[2]) != typed):
-        return toml_text(typed if kept in ("1", "rad") else f"{typed} {kept}")
+def _format_number(problem: Posed, name: str, value: float) -> str:
+    """Write a number as it was typed or in the unit of the file, whichever first gives back exactly this number."""
+    unit, typed_text = problem.parameter_set[name].unit, problem.typed({name: value}).get(name, "")
+    text = exact_value(value, problem.units.get(name, ""), unit)
+    if typed_text and (text[0] != '"' or str(parse_exact_quantity(text[1:-1], unit)[2]) != typed_text):
+        return toml_text(typed_text if unit in ("1", "rad") else f"{typed_text} {unit}")
     return text

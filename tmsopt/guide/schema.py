@@ -1,7 +1,7 @@
-"""The shape of problem and study files as JSON Schema, by which editors complete, explain and check them.
+"""The JSON Schema of problem and study files, with which editors complete, explain and check them.
 
-Made from the shapes that read the files and from the models, in draft 2020-12. Taplo, the engine of Even Better TOML,
-completes and explains by ``properties``, ``anyOf`` and ``$ref`` alone, and checks by everything.
+It is made from the pydantic classes that read the files and from the models, in draft 2020-12. Taplo, the engine of
+Even Better TOML, uses only ``properties``, ``anyOf`` and ``$ref`` to complete and explain, but every keyword to check.
 """
 
 import math
@@ -31,7 +31,7 @@ _OF_STUDY: Schema = {"anyOf": [{"required": [key]} for key in ("problem", "study
 
 
 def schema() -> Schema:
-    """The JSON Schema of problem files and study files, as plain data.
+    """Return the JSON Schema of problem files and study files, as plain data.
 
     Example:
         >>> tmsopt.schema()["$schema"]
@@ -39,83 +39,87 @@ def schema() -> Schema:
 
     More: docs/reference/problem_file.md
     """
-    problem, defs = _shape(PROBLEM)
-    study, more = _shape(STUDY)
-    defs |= more
+    problem, defs = _read_shape(PROBLEM)
+    study, study_defs = _read_shape(STUDY)
+    defs |= study_defs
     _refine_problem(problem, defs)
     _refine_study(study, defs)
-    defs |= {"parameters_own": _own(defs.pop("FreeParameter"))}
+    defs |= {"parameters_own": _describe_own(defs.pop("FreeParameter"))}
     for name in MODELS:
-        sets, gains = _sets(name), set(gain_names(name))
-        own = [[p for p in of.parameters if p.name in gains] for of in sets]
-        defs[f"feedback_{name}"] = _table(f"Gains of a controller of {name}.", own)
-        defs[f"parameters_{name}"] = _table(f"Parameters of {name}.", [of.parameters for of in sets])
-        defs[f"parameters_{name}"]["properties"] |= {n: _ref(f"feedback_{name}/properties/{n}") for n in sorted(gains)}
+        sets, gains = _find_sets(name), set(gain_names(name))
+        gain_sets = [[p for p in parameter_set.parameters if p.name in gains] for parameter_set in sets]
+        defs[f"feedback_{name}"] = _describe_table(f"Gains of a controller of {name}.", gain_sets)
+        defs[f"parameters_{name}"] = _describe_table(
+            f"Parameters of {name}.", [parameter_set.parameters for parameter_set in sets]
+        )
+        defs[f"parameters_{name}"]["properties"] |= {
+            n: _refer_to(f"feedback_{name}/properties/{n}") for n in sorted(gains)
+        }
     return {
         "$schema": DRAFT,
         "title": "tmsopt",
         "description": "A problem file or a study file of tmsopt.",
         "type": "object",
-        **_offer(_ref("problem"), _ref("study_file")),
+        **_suggest(_refer_to("problem"), _refer_to("study_file")),
         "if": _OF_STUDY,
-        "then": _ref("study_file"),
-        "else": _ref("problem"),
+        "then": _refer_to("study_file"),
+        "else": _refer_to("problem"),
         "$defs": {**defs, "problem": problem, "study_file": study},
     }
 
 
-def _ref(name: str) -> Schema:
+def _refer_to(name: str) -> Schema:
     return {"$ref": f"#/$defs/{name}"}
 
 
-def _offer(*several: Schema) -> Schema:
-    """What an editor may offer, without a word on what is wrong: the last one always holds."""
-    return {"anyOf": [*several, {}]}
+def _suggest(*schemas: Schema) -> Schema:
+    """Offer completions to an editor without a check: the empty schema at the end accepts everything."""
+    return {"anyOf": [*schemas, {}]}
 
 
-def _either(*kinds: Schema) -> Schema:
-    """Schemas of different types as one: each keyword is for its type, and a fault is told at its place."""
+def _merge_types(*kinds: Schema) -> Schema:
+    """Merge schemas of different types to one; each keyword applies to its type, so faults are shown at their place."""
     return {key: value for kind in kinds for key, value in kind.items()} | {"type": [kind["type"] for kind in kinds]}
 
 
-def _shape(of: Any) -> tuple[Schema, dict[str, Schema]]:
-    """The schema of a pydantic shape, without titles and nulls, and the shapes that it refers to."""
-    whole = _plain(of.model_json_schema())
-    defs = {name.strip("_"): inner for name, inner in whole.pop("$defs", {}).items()}
-    return whole, defs
+def _read_shape(shape: Any) -> tuple[Schema, dict[str, Schema]]:
+    """Return the schema of a pydantic class, without titles and nulls, and the schemas that it refers to."""
+    model_schema = _simplify(shape.model_json_schema())
+    defs = {name.strip("_"): inner for name, inner in model_schema.pop("$defs", {}).items()}
+    return model_schema, defs
 
 
-def _plain(node: Any) -> Any:
+def _simplify(node: Any) -> Any:
     match node:
         case str():
             return node.replace("#/$defs/_", "#/$defs/")
         case list():
-            return [_plain(inner) for inner in node]
+            return [_simplify(inner) for inner in node]
         case dict():
             titled = isinstance(node.get("title"), str)
-            left = {k: _plain(v) for k, v in node.items() if not (k == "title" and titled)}
+            result = {k: _simplify(v) for k, v in node.items() if not (k == "title" and titled)}
         case _:
             return node
-    if left.get("default", "") is None:
-        del left["default"]
-    if "anyOf" in left:
-        kinds = [kind for kind in left.pop("anyOf") if kind != {"type": "null"}]
+    if result.get("default", "") is None:
+        del result["default"]
+    if "anyOf" in result:
+        kinds = [kind for kind in result.pop("anyOf") if kind != {"type": "null"}]
         if all(set(kind) == {"type"} for kind in kinds):
             names = [kind["type"] for kind in kinds]
-            names = [n for n in names if n != "integer" or "number" not in names]  # number takes in integer
-            return left | {"type": names[0] if len(names) == 1 else names}
-        left |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
-    return left
+            names = [n for n in names if n != "integer" or "number" not in names]  # a number may be an integer
+            return result | {"type": names[0] if len(names) == 1 else names}
+        result |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+    return result
 
 
 def _refine_problem(problem: Schema, defs: dict[str, Schema]) -> None:
-    """What the shape leaves open: names of models, patterns and parameters, and what goes with what."""
+    """Add the names of models, patterns and parameters, and which keys belong together."""
     keys, objective, band = problem["properties"], defs.pop("Objective"), defs.pop("Band")
     for shape in (defs["FreeParameter"], band):
         for end in ("min", "max", "start"):
             shape["properties"].get(end, {})["pattern"] = _WITH_UNIT
     band["properties"]["points"] |= {"minimum": 2, "maximum": 99}
-    objective["properties"]["locate"] |= {**_offer({"enum": list(pattern_names(4))}), "pattern": _PATTERN}
+    objective["properties"]["locate"] |= {**_suggest({"enum": list(pattern_names(4))}), "pattern": _PATTERN}
     objective["properties"]["pareto"] |= {"minItems": 2, "maxItems": 3, "uniqueItems": True}
     objective["not"] = {"required": ["minimize", "maximize"]}
     keys["objective"] = {"description": objective["description"], **objective}
@@ -124,65 +128,69 @@ def _refine_problem(problem: Schema, defs: dict[str, Schema]) -> None:
     keys["model"] = {
         "description": f"{keys['model']['description']} {titles}.",
         "default": "tms",
-        **_offer({"enum": list(MODELS)}),
+        **_suggest({"enum": list(MODELS)}),
         "if": {"type": "string"},
         "then": {"enum": list(MODELS)},
-        "else": _model_table(),
+        "else": _describe_model(),
     }
-    for table, own in (("parameters", ["own"]), ("feedback", [])):
-        offered = _offer(*(_ref(f"{table}_{name}") for name in (*MODELS, *own)))
+    for table, extra_names in (("parameters", ["own"]), ("feedback", [])):
+        offered = _suggest(*(_refer_to(f"{table}_{name}") for name in (*MODELS, *extra_names)))
         keys[table] = {"description": keys[table]["description"], "type": "object", **offered}
     _, listed = keys["scenarios"]["additionalProperties"]["anyOf"]
-    keys["scenarios"]["additionalProperties"] = _either(band, listed)
-    del problem["required"]  # of parameters, which a measured bicycle has in its own file
+    keys["scenarios"]["additionalProperties"] = _merge_types(band, listed)
+    del problem["required"]  # parameters may be missing: a measured bicycle has them in its own file
     problem["if"] = {"required": ["bicycle"]}
-    problem["then"] = _with_names("whipple")
-    problem["else"] = {"required": ["parameters"], **_by_model([name for name in MODELS if name != "tms"])}
+    problem["then"] = _allow_names("whipple")
+    problem["else"] = {"required": ["parameters"], **_choose_by_model([name for name in MODELS if name != "tms"])}
 
 
-def _by_model(names: list[str]) -> Schema:
-    """Which names and values a file may use, by its model; tms where it names none."""
+def _choose_by_model(names: list[str]) -> Schema:
+    """Choose the names and values that a file may use by its model; the default is tms."""
     if not names:
         return {
             "if": {"properties": {"model": {"type": "object"}}, "required": ["model"]},
-            "then": {"properties": {"parameters": _ref("parameters_own"), "feedback": {"maxProperties": 0}}},
-            "else": _with_names("tms"),
+            "then": {"properties": {"parameters": _refer_to("parameters_own"), "feedback": {"maxProperties": 0}}},
+            "else": _allow_names("tms"),
         }
-    named = {"properties": {"model": {"const": names[0]}}, "required": ["model"]}
-    return {"if": named, "then": _with_names(names[0]), "else": _by_model(names[1:])}
+    condition = {"properties": {"model": {"const": names[0]}}, "required": ["model"]}
+    return {"if": condition, "then": _allow_names(names[0]), "else": _choose_by_model(names[1:])}
 
 
-def _with_names(model: str) -> Schema:
-    accepted = {"propertyNames": {"enum": list(dict.fromkeys(n for of in _sets(model) for n in of.names))}}
+def _allow_names(model: str) -> Schema:
+    accepted = {
+        "propertyNames": {
+            "enum": list(dict.fromkeys(n for parameter_set in _find_sets(model) for n in parameter_set.names))
+        }
+    }
     tables = dict.fromkeys(("scenarios", "tolerances", "weights"), accepted)
-    own = {"parameters": _ref(f"parameters_{model}"), "feedback": _ref(f"feedback_{model}")}
-    return {"properties": {**own, **tables}}
+    parameter_tables = {"parameters": _refer_to(f"parameters_{model}"), "feedback": _refer_to(f"feedback_{model}")}
+    return {"properties": {**parameter_tables, **tables}}
 
 
-def _sets(model: str) -> tuple[ParameterSet, ...]:
-    """With all that a controller may have, which may stand in [parameters] too."""
+def _find_sets(model: str) -> tuple[ParameterSet, ...]:
+    """Return the parameter sets with all gains of a controller, which [parameters] may contain too."""
     return controlled(MODELS[model], gain_names(model)).sets
 
 
-def _table(description: str, sets: Sequence[Sequence[Parameter]]) -> Schema:
-    """A table of parameters; sets are not mixed."""
-    names = [[p.name for p in of] for of in sets]
-    accepted: Schema = _only(names[-1])
-    for k, of in reversed(list(enumerate(names[:-1]))):
-        others = {n for j, other in enumerate(names) if j != k for n in other}
-        named = {"anyOf": [{"required": [n]} for n in of if n not in others]}
-        accepted = {"if": named, "then": _only(of), "else": accepted}
-    properties = {p.name: _parameter(p) for of in sets for p in of}
+def _describe_table(description: str, sets: Sequence[Sequence[Parameter]]) -> Schema:
+    """Describe a table with the parameters of one of the sets."""
+    names = [[p.name for p in members] for members in sets]
+    accepted: Schema = _allow_only(names[-1])
+    for k, members in reversed(list(enumerate(names[:-1]))):
+        other_names = {n for j, other in enumerate(names) if j != k for n in other}
+        condition = {"anyOf": [{"required": [n]} for n in members if n not in other_names]}
+        accepted = {"if": condition, "then": _allow_only(members), "else": accepted}
+    properties = {p.name: _describe_parameter(p) for members in sets for p in members}
     closed = {"properties": properties, "additionalProperties": False}
     return {"description": description, "type": "object", **accepted, **closed}
 
 
-def _only(names: Iterable[str]) -> Schema:
+def _allow_only(names: Iterable[str]) -> Schema:
     return {"properties": dict.fromkeys(names, True), "additionalProperties": False}
 
 
-def _parameter(p: Parameter) -> Schema:
-    """A number, a text with a unit, or a table that frees it: each keyword is for the one that it fits."""
+def _describe_parameter(p: Parameter) -> Schema:
+    """Describe a parameter: a number, a text with a unit, or a table with bounds. Each keyword fits one of them."""
     limits = ("minimum", "maximum") if p.range.closed else ("exclusiveMinimum", "exclusiveMaximum")
     ends = zip(limits, (p.range.lower, p.range.upper), strict=True)
     kinds, unit, pattern = ["number"], "", {}
@@ -201,18 +209,18 @@ def _parameter(p: Parameter) -> Schema:
 _ENDS = {"min": "least value", "max": "greatest value", "start": "value to start the search from, among others"}
 
 
-def _own(free: Schema) -> Schema:
-    """Parameters of a system of one's own: any names, numbers without unit."""
+def _describe_own(free: Schema) -> Schema:
+    """Describe the parameters of a user's system: any names, numbers without units."""
     return {
         "description": "Parameters of a system of your own: the names in its expressions.",
         "type": "object",
         "propertyNames": {"pattern": _NAME},
-        "additionalProperties": _either({"type": "number"}, free),
+        "additionalProperties": _merge_types({"type": "number"}, free),
     }
 
 
-def _model_table() -> Schema:
-    """The table [model]."""
+def _describe_model() -> Schema:
+    """Describe the table [model]."""
     entry = {"type": ["number", "string"]}
     rows = {"type": "array", "items": {"type": "array", "items": entry, "minItems": 1}, "minItems": 1}
     shapes: dict[str, Schema] = {
@@ -234,9 +242,9 @@ def _refine_study(study: Schema, defs: dict[str, Schema]) -> None:
     keys["study"] = {"description": keys["study"]["description"], **options}
     keys["problem"] = {
         "description": keys["problem"]["description"],
-        **_offer(_ref("problem")),
+        **_suggest(_refer_to("problem")),
         "if": {"type": "object"},
-        "then": _ref("problem"),
+        "then": _refer_to("problem"),
         "else": {"type": "string"},
     }
     number: Schema = {"type": ["number", "string"]}
@@ -251,6 +259,6 @@ def _refine_study(study: Schema, defs: dict[str, Schema]) -> None:
             "log": {"description": "Whether steps are equal factors.", "type": "boolean"},
         },
     }
-    values = _either({"type": "array", "items": number}, axis)
+    values = _merge_types({"type": "array", "items": number}, axis)
     inner = {"type": "object", "propertyNames": {"enum": ["min", "max", "limit"]}, "additionalProperties": values}
     keys["vary"]["additionalProperties"] = {"anyOf": [values, inner]}  # lambda_s.max without quotes is a table
