@@ -83,7 +83,7 @@ def tangent_matrices(T: Any, w: Any, **bodies: Any) -> tuple[Matrix, Matrix, Mat
     """M, C1, K0 and K2 with T = tan λ, for a steer angle in units of cos λ/w.
 
     Args:
-        bodies: the other lengths, masses, inertias and spins of `matrices`.
+        bodies: the remaining lengths, masses, inertias and spins, as in `matrices`.
     """
     return matrices(w, **bodies, sine=w * T, cosine=w, turn=1)
 
@@ -106,19 +106,19 @@ def powers_of_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix) -> tuple[Any,
     )
 
 
-def carvallo_whipple(v: Any, g: Any, **others: Any) -> list[Any]:
-    """Coefficients a0 … a4 of det(M s² + v C1 s + g K0 + v² K2) · (w/cos λ)², with T = tan λ, by ``+ - *`` alone.
+def carvallo_whipple(v: Any, g: Any, **other_parameters: Any) -> list[Any]:
+    """Coefficients a0 … a4 of det(M s² + v C1 s + g K0 + v² K2) · (w/cos λ)², with T = tan λ, by ``+ - *`` only.
 
     The factor comes from a steer angle in units of cos λ/w, in which the equations are polynomials in T and w.
 
     Args:
-        others: the other algebraic parameters, those of `tangent_matrices`.
+        other_parameters: the arguments of `tangent_matrices`.
     """
-    b = powers_of_speed(*tangent_matrices(**others))
+    b = powers_of_speed(*tangent_matrices(**other_parameters))
     v2 = v * v
     return [b[0], v * b[1], g * b[2] + v2 * b[3], v * (g * b[4] + v2 * b[5]), g * (g * b[6] + v2 * b[7])]
 
 
 def _mixed_determinant(A: Matrix, B: Matrix) -> Any:
-    """The part of det(A + B) that is linear in A and in B."""
+    """The terms of det(A + B) that contain one entry of A and one of B."""
     return A[0][0] * B[1][1] + A[1][1] * B[0][0] - A[0][1] * B[1][0] - A[1][0] * B[0][1]
