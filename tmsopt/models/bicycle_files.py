@@ -68,9 +68,9 @@ class Bicycle:
 
     def tolerances(self, deviations: float = 2.0, most: int = 8) -> dict[str, float]:
         """Tolerances of `deviations` standard deviations for the `most` parameters of largest relative deviation."""
-        share = {n: u / (abs(self.parameters[n]) or math.inf) for n, u in self.uncertainties.items()}
-        chosen = sorted(share, key=lambda n: -share[n])[:most]
-        return {n: deviations * self.uncertainties[n] for n in self.parameters if n in chosen}
+        relative_deviations = {n: u / (abs(self.parameters[n]) or math.inf) for n, u in self.uncertainties.items()}
+        names = sorted(relative_deviations, key=lambda n: -relative_deviations[n])[:most]
+        return {n: deviations * self.uncertainties[n] for n in self.parameters if n in names}
 
 
 def read_bicycle(path: str | PathLike[str]) -> Bicycle:
@@ -113,10 +113,11 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
             parameters[_MODEL_NAMES[name]], deviations[_MODEL_NAMES[name]] = numbers
         if message:
             faults.append(Fault(message).at(str(path), number))
-    reported = {name for _, name, _ in entries}
-    if missing := [w for n, w in _FILE_NAMES.items() if w not in reported and n not in _OPTIONAL_NAMES]:
-        raw = "These are raw measurements; make the Benchmark file with BicycleParameters." if "hbb" in reported else ""
-        faults.append(Fault(f"missing: {', '.join(missing)}. {raw}".strip(), file=str(path)))
+    names_in_file = {name for _, name, _ in entries}
+    if missing := [w for n, w in _FILE_NAMES.items() if w not in names_in_file and n not in _OPTIONAL_NAMES]:
+        hint = "These are raw measurements; make the Benchmark file with BicycleParameters."
+        message = f"missing: {', '.join(missing)}. {hint if 'hbb' in names_in_file else ''}"
+        faults.append(Fault(message.strip(), file=str(path)))
     for name, value in parameters.items():
         if value not in (parameter := _SI[name]).range:
             message = f"{_FILE_NAMES[name]} = {value:.6g} is not physical"
@@ -124,11 +125,11 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
             faults.append(Fault(f"{message}; {accepted}", file=str(path)))
     if faults:
         raise InputError(faults)
-    ordered = {n: parameters[n] for n in _SI.names if n in parameters}
+    ordered_parameters = {n: parameters[n] for n in _SI.names if n in parameters}
     return Bicycle(
         escape_unprintable(file.stem),
-        Table(ordered),
-        Table({n: deviations[n] for n in ordered if deviations[n] > 0}),
+        Table(ordered_parameters),
+        Table({n: deviations[n] for n in ordered_parameters if deviations[n] > 0}),
         Table(other_numbers),
     )
 

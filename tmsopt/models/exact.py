@@ -206,8 +206,8 @@ def as_exact_design(
     Raises:
         InputError: if a name is unknown, a value is not exact, or it differs from the double of the design.
     """
-    if wrong := table_faults("exact", {} if exact_numbers is None else exact_numbers, "{'zeta_B': '-1/3'}"):
-        raise InputError(wrong)
+    if table_errors := table_faults("exact", {} if exact_numbers is None else exact_numbers, "{'zeta_B': '-1/3'}"):
+        raise InputError(table_errors)
     names = {n: n for n in parameter_set.names} | {
         f"tan({p.name})": p.name for p in parameter_set.parameters if p.tangent
     }

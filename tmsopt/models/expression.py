@@ -191,8 +191,8 @@ def _comparison(text: str) -> Expression:
     if len(body.ops) > 1:
         texts = pairwise(_source(side, text) for side in (body.left, *body.comparators))
         signs = ({**COMPARISONS, **_STRICT_SIGNS}.get(type(op), "==") for op in body.ops)
-        each = " and ".join(f"'{a} {sign} {b}'" for (a, b), sign in zip(texts, signs, strict=True))
-        raise ExpressionError(f"{_quote(text)} joins several comparisons; write one constraint for each, {each}")
+        parts = " and ".join(f"'{a} {sign} {b}'" for (a, b), sign in zip(texts, signs, strict=True))
+        raise ExpressionError(f"{_quote(text)} joins several comparisons; write one constraint for each, {parts}")
     sign = COMPARISONS.get(type(body.ops[0]))
     if sign is None:
         raise ExpressionError(f"{_quote(text)} compares with a sign other than <=, >= and =={_advice(text)}")

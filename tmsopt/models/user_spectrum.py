@@ -99,22 +99,22 @@ def describe_user_structure(model: Model, structure: str, gain: bool = False) ->
 
 def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """ω = i s for the user's roots; empty for a real system."""
-    each = () if model.carrier is None else remove_rounding(model, roots)
-    return tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in each)
+    clean_roots = () if model.carrier is None else remove_rounding(model, roots)
+    return tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in clean_roots)
 
 
 def remove_rounding(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """The user's roots, in which real and imaginary parts as small as the rounding error of the carrier are 0."""
-    each = tuple(roots)
-    rounding = 0.0 if model.carrier is None else _ROUNDING * _size(model, each)
-    parts = ([x if abs(x) > rounding else 0.0 for x in (r.re, r.im)] for r in each)
-    return tuple(Root(re, im, r.multiplicity) for (re, im), r in zip(parts, each, strict=True))
+    all_roots = tuple(roots)
+    rounding = 0.0 if model.carrier is None else _ROUNDING * _size(model, all_roots)
+    parts = ([x if abs(x) > rounding else 0.0 for x in (r.re, r.im)] for r in all_roots)
+    return tuple(Root(re, im, r.multiplicity) for (re, im), r in zip(parts, all_roots, strict=True))
 
 
 def roots_on_axis(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """The user's roots on the imaginary axis, which are real eigenfrequencies of H."""
-    each = tuple(roots)
-    return tuple(r for r in each if abs(r.re) <= ON_AXIS * _size(model, each))
+    all_roots = tuple(roots)
+    return tuple(r for r in all_roots if abs(r.re) <= ON_AXIS * _size(model, all_roots))
 
 
 def beyond_axis(model: Model, located: Sequence[str], roots: Sequence[Root]) -> float | None:

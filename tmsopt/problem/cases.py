@@ -70,13 +70,13 @@ class Case:
 
     def applied(self, parameters: AnyNumbers, radius: Any = 0.0, weights: Numbers | None = None) -> dict[str, Any]:
         """The varied design, for numbers, arrays or CasADi expressions."""
-        varied = {**parameters, **self.at}
+        values = {**parameters, **self.at}
         for name, change in self.offset.items():
-            varied[name] = varied[name] + change
+            values[name] = values[name] + change
         distance = 1.0 if self.edge else radius
         for name, share in self.direction.items():
-            varied[name] = varied[name] + distance * share * weight_of(name, parameters[name], weights or {})
-        return varied
+            values[name] = values[name] + distance * share * weight_of(name, parameters[name], weights or {})
+        return values
 
 
 def weight_of(name: str, value: Any, weights: Numbers) -> Any:

@@ -35,10 +35,10 @@ def depends_on_case(problem: Posed, expression: Expression, cases: Sequence[Case
     A root quantity is the worst value over the cases, so it is the same in all of them. An equality is required at the
     nominal design only, because it cannot hold at two corners of a box.
     """
-    varied = {name for case in cases for table in (case.at, case.offset) for name in table}
-    if not varied or expression.equality:
+    varied_names = {name for case in cases for table in (case.at, case.offset) for name in table}
+    if not varied_names or expression.equality:
         return False
-    return bool(varied & _find_dependencies(problem.model, problem.parameter_set.name, expression))
+    return bool(varied_names & _find_dependencies(problem.model, problem.parameter_set.name, expression))
 
 
 def needs_two_sided_bounds(problem: Posed) -> bool:
@@ -77,10 +77,10 @@ def stability_limit(problem: Posed, least_decay: float = _LEAST_DECAY) -> dict[s
         limits = (c for c in problem.conditions.values() if roots & set(c.names))
         return any(not c.holds(float(c(values.with_known(root_values)))) for c in limits)
 
-    goal = problem.objective is not None and bool(roots & set(problem.objective.names))
-    if not goal and not is_excluded(1e-6 * size, -1e-6):
+    objective_uses_roots = problem.objective is not None and bool(roots & set(problem.objective.names))
+    if not objective_uses_roots and not is_excluded(1e-6 * size, -1e-6):
         return {}
-    allows_edge = not goal and not is_excluded(0.0, 0.0)
+    allows_edge = not objective_uses_roots and not is_excluded(0.0, 0.0)
     decay = 0.0 if allows_edge or not 0 < size < np.inf else least_decay * size
     return {STABLE: f"abscissa <= {0.0 - decay!r}"}
 
@@ -100,9 +100,9 @@ def sense_notes(problem: Posed) -> tuple[str, ...]:
 
 def demands_heavy_damping(problem: Posed) -> bool:
     """Whether a constraint on the damping ratio allows only 1: all roots real and negative."""
-    below, at = ({"damping_ratio": ratio} for ratio in (1 - 1e-9, 1.0))
+    below_one, at_one = ({"damping_ratio": ratio} for ratio in (1 - 1e-9, 1.0))
     limits = (c for c in problem.conditions.values() if c.names == ("damping_ratio",))
-    return any(c.holds(float(c(at))) and not c.holds(float(c(below))) for c in limits)
+    return any(c.holds(float(c(at_one))) and not c.holds(float(c(below_one))) for c in limits)
 
 
 def _can_fall(problem: Posed, sign: float, expression: Expression, name: str, worse: float) -> bool:

@@ -46,8 +46,8 @@ class ArrayFunction:
         Returns:
             Name → value, in the shape of the columns that the expression depends on.
         """
-        missing = {n for n in self.formula.inputs if n not in columns}
-        root_values = roots_of(coefficients_of(self.problem, columns), missing) if missing else {}
+        missing_names = {n for n in self.formula.inputs if n not in columns}
+        root_values = roots_of(coefficients_of(self.problem, columns), missing_names) if missing_names else {}
         return dict(zip(self.names, evaluate_on_arrays(self.formula, {**columns, **root_values}), strict=True))
 
 

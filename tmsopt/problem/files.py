@@ -166,8 +166,8 @@ def _add_bicycle_parameters(page: Page) -> Tables:
             f if f.line else Fault(f"{name} {f.message}; the name is relative to this file", ("bicycle",))
             for f in error.faults
         ) from None
-    measured = {n: v for n, v in bicycle.parameters.items() if n not in data.get("scenarios", {})}
-    return {"model": "whipple", **data, "parameters": {**measured, **parameters}}
+    bicycle_parameters = {n: v for n, v in bicycle.parameters.items() if n not in data.get("scenarios", {})}
+    return {"model": "whipple", **data, "parameters": {**bicycle_parameters, **parameters}}
 
 
 def problem_from_tables(data: Tables, title: str) -> tuple[list[Fault], Problem | None]:
@@ -193,9 +193,9 @@ def problem_from_tables(data: Tables, title: str) -> tuple[list[Fault], Problem 
         try:
             problem = Problem(model=model, constraints=parsed.constraints, title=title, **tables, **objective)
         except InputError as error:
-            reported = {f.key[:2] for f in faults} | {("parameters", *f.key[1:2]) for f in faults}
-            reported |= {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
-            faults += [f for f in error.faults if f.key[:2] not in reported]
+            reported_keys = {f.key[:2] for f in faults} | {("parameters", *f.key[1:2]) for f in faults}
+            reported_keys |= {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
+            faults += [f for f in error.faults if f.key[:2] not in reported_keys]
     named_faults = [replace(f, key=("feedback", *f.key[1:])) if {*f.key[1:2]} & gains else f for f in faults]
     return gains_faults + named_faults, problem
 
@@ -209,8 +209,8 @@ def _split_gains(data: Tables) -> tuple[list[Fault], set[str], Tables]:
     accepted = gain_names(model) if isinstance(model, str) else ()
     if not accepted:
         message = "is for the bicycles tms and whipple; write B, C and G in [model] for your own system"
-        misspelt = isinstance(model, str) and model not in MODELS  # reported elsewhere
-        return [] if misspelt else [Fault(message, ("feedback",))], set(), remaining_data
+        is_misspelt = isinstance(model, str) and model not in MODELS  # reported elsewhere
+        return [] if is_misspelt else [Fault(message, ("feedback",))], set(), remaining_data
     faults = []
     for name in gains:
         if name not in accepted:

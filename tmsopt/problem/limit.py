@@ -27,9 +27,9 @@ def split_limit(text: str) -> WrittenLimit | None:
         ExpressionError: for a text that does not parse.
     """
     left, sign, right = written_sides(text)
-    for before, side, behind in (("", left, f" {sign} {right}"), (f"{left} {sign} ", right, "")):
+    for text_before, side, text_behind in (("", left, f" {sign} {right}"), (f"{left} {sign} ", right, "")):
         if _NUMBER.fullmatch(number := _remove_blanks(side)):
-            return WrittenLimit(before, float(number), behind)
+            return WrittenLimit(text_before, float(number), text_behind)
     return None
 
 

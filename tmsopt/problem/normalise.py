@@ -27,10 +27,12 @@ def normalise(**arguments: Any) -> dict[str, Any]:
     problem.model = controlled(problem.model, names)
     # The parameter set with most of the names; the native one in case of a tie.
     parameter_set = max(problem.model.sets, key=lambda s: len(names.keys() & set(s.names)))
-    tables, units, typed, unreadable = read_numbers({table: getattr(problem, table) for table in TABLES}, parameter_set)
+    tables = {table: getattr(problem, table) for table in TABLES}
+    tables, units, typed, reading_faults = read_numbers(tables, parameter_set)
     vars(problem).update(tables)
-    unreadable_keys = {f.key[:2] for f in unreadable}
-    if faults := [*unreadable, *(f for f in find_faults(problem, parameter_set) if f.key[:2] not in unreadable_keys)]:
+    unreadable_keys = {f.key[:2] for f in reading_faults}
+    faults = reading_faults + [f for f in find_faults(problem, parameter_set) if f.key[:2] not in unreadable_keys]
+    if faults:
         raise InputError(faults)
     problem.units = {**units, **problem.units}
     problem.written = {n: {**typed.get(n, {}), **problem.written.get(n, {})} for n in (*problem.written, *typed)}
@@ -52,9 +54,9 @@ def complete_fields(**fields: Any) -> dict[str, Any]:
     H gets a carrier for the ranges.
     """
     free = fields["free"]
-    pinned = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _MIN_WIDTH * max(abs(lo), abs(hi))}
-    fixed = {n: float(v) for n, v in {**fields["fixed"], **pinned}.items()}
-    free = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in pinned}
+    single_values = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _MIN_WIDTH * max(abs(lo), abs(hi))}
+    fixed = {n: float(v) for n, v in {**fields["fixed"], **single_values}.items()}
+    free = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in single_values}
     start = {n: float(v) for n, v in fields["start"].items() if n in free}
     ranges = {n: (x, x) for n, x in fixed.items()} | free  # least and greatest value over all cases
     for name, scenario in fields["scenarios"].items():

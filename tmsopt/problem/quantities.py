@@ -53,8 +53,8 @@ def _structure(values: AnyNumbers) -> Structure:
     if abs(a[0]) <= roundings[0] < math.inf:
         return undecided  # a0 may be 0 within rounding
     root_structure = _cached_structure(tuple(a), tuple(map(float, roundings)))
-    simple = root_structure.name in SIMPLE and all(root.multiplicity == 1 for root in root_structure.roots)
-    if simple and _scatter(np.array(a), root_structure) > _SCATTER:
+    is_simple = root_structure.name in SIMPLE and all(root.multiplicity == 1 for root in root_structure.roots)
+    if is_simple and _scatter(np.array(a), root_structure) > _SCATTER:
         root_structure = replace(root_structure, roots=roots_at(*values.given) or root_structure.roots)
     return root_structure
 
@@ -77,8 +77,8 @@ def roots_at(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) 
     Coefficients have 120 digits, and roots are isolated in interval arithmetic.
     """
     with flint.ctx.workdps(_DIGITS):
-        exact = {name: flint.arb(value) for name, value in parameters.items()}
-        coefficients = model.coefficients(exact, parameter_set)
+        exact_parameters = {name: flint.arb(value) for name, value in parameters.items()}
+        coefficients = model.coefficients(exact_parameters, parameter_set)
     if not all(c.is_finite() for c in coefficients):
         return ()
     leading = next((k for k, c in enumerate(coefficients) if c.mid() != 0), None)
@@ -131,10 +131,10 @@ def root_names(model: Model) -> tuple[str, ...]:
 
 def expand_names(text: str, parameter_set: ParameterSet) -> str:
     """Replace short names, such as decay_rate by -(abscissa*sqrt(g/w)). A `text` of another type stays unchanged."""
-    short = {q.name: q.stands_for for q in parameter_set.quantities if q.stands_for}
-    if not short or not isinstance(text, str):
+    expansions = {q.name: q.stands_for for q in parameter_set.quantities if q.stands_for}
+    if not expansions or not isinstance(text, str):
         return text
-    return re.sub(rf"\b({'|'.join(short)})\b", lambda match: short[match[0]], text)
+    return re.sub(rf"\b({'|'.join(expansions)})\b", lambda match: expansions[match[0]], text)
 
 
 def regularise(coefficients: Array) -> Array:

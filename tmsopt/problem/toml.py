@@ -49,8 +49,8 @@ class Page:
 
     def error(self, faults: Iterable[Fault]) -> InputError:
         """The faults in the order of their lines; a fault without a file is located in this one."""
-        placed = [f if f.file else f.at(self.file, self._line_of(f.key)) for f in faults]
-        return InputError(sorted(placed, key=lambda f: f.line))
+        located_faults = [f if f.file else f.at(self.file, self._line_of(f.key)) for f in faults]
+        return InputError(sorted(located_faults, key=lambda f: f.line))
 
     def _line_of(self, key: Key) -> int:
         """Line of the longest prefix of a key path that the file has; 1 if it has none."""
@@ -108,9 +108,10 @@ def validate_tables(
 
 
 def _drop_keys(data: Tables, keys: set[Key]) -> dict[str, Any]:
-    inner = {n: {k: v for k, v in t.items() if (n, k) not in keys} for n, t in data.items() if isinstance(t, dict)}
-    plain = {n for n, *rest in keys if not rest or n not in inner}
-    return {n: inner.get(n, value) for n, value in data.items() if n not in plain}
+    tables = {n: t for n, t in data.items() if isinstance(t, dict)}
+    inner_tables = {n: {k: v for k, v in t.items() if (n, k) not in keys} for n, t in tables.items()}
+    dropped_names = {n for n, *rest in keys if not rest or n not in inner_tables}
+    return {n: inner_tables.get(n, value) for n, value in data.items() if n not in dropped_names}
 
 
 _TOKEN = re.compile(
@@ -144,7 +145,7 @@ def _scan_lines(text: str) -> _Scan:
     section: Key = ()
     line, statement_line, depth, key_parts = 1, 1, 0, 0
     head: list[str] | None = []  # parts of the current section or key; None inside a value
-    end = previous = "="  # end of the head, "]" for a section; the previous token
+    end = previous_token = "="  # end of the head, "]" for a section; the previous token
     for match in _TOKEN.finditer(text):
         token = match[0]
         if token == "\n":
@@ -163,14 +164,14 @@ def _scan_lines(text: str) -> _Scan:
                 scan.lines.setdefault(key, line)
                 head = None
         elif token[0] != "#":
-            key_parts = key_parts + 1 if previous == "." else 1
+            key_parts = key_parts + 1 if previous_token == "." else 1
             if head is not None:
                 head.append(token.strip("\"'"))
         if message := _size_problem(token, key_parts, depth):
             scan.fault = Fault(message, line=line)
             break
         line += token.count("\n")
-        previous = token
+        previous_token = token
     scan.unclosed = scan.unclosed or (statement_line if depth else 0)
     return scan
 

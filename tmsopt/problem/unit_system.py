@@ -62,8 +62,8 @@ def unit_of(problem: Posed, text: str) -> Unit:
     name = text.strip().removesuffix(".min").removesuffix(".max").removesuffix(".limit")
     if name in problem.parameter_set.names:
         return _make_unit(problem.units.get(name, ""), units[name])
-    used = set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name)))
-    if units.get(_FREQUENCY) == _HERTZ and used == {_FREQUENCY}:
+    names = set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name)))
+    if units.get(_FREQUENCY) == _HERTZ and names == {_FREQUENCY}:
         return Unit(_HERTZ)
     return _usual_unit(problem, Dimension.of(units[name]) if name in units else dimension_of(problem, text, units))
 
@@ -112,11 +112,11 @@ def si_units(problem: Posed) -> dict[str, str]:
     """Name → unit in which a parameter, quantity or root quantity is computed; ``1`` without a unit."""
     parameter_set = problem.parameter_set
     quantities = (*problem.model.quantities, *parameter_set.quantities)
-    listed: tuple[Parameter | Quantity, ...] = (*quantities, *parameter_set.parameters)
+    items: tuple[Parameter | Quantity, ...] = (*quantities, *parameter_set.parameters)
     rates = {"abscissa": parameter_set.root_unit, ANGULAR_FREQUENCY: parameter_set.root_unit}
     if parameter_set.rate is not None:  # the parameters define seconds
         rates |= {"decay_rate": _PER_SECOND, "decay_time": "s", _FREQUENCY: _HERTZ}
-    return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
+    return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in items}
 
 
 def amounts_text(problem: Posed, amounts: Numbers) -> str:
@@ -163,8 +163,8 @@ def _usual_unit(problem: Posed, dimension: Dimension) -> Unit:
     """The unit that most parameters of a dimension were typed in."""
     parameter_set, unit = problem.parameter_set, dimension.unit
     parameters = (p for p in parameter_set.parameters if p.name in problem.units)
-    typed = Counter(problem.units[p.name] for p in parameters if Dimension.of(p.unit) == dimension)
-    return _make_unit(typed.most_common(1)[0][0] if typed else "", unit)
+    typed_units = Counter(problem.units[p.name] for p in parameters if Dimension.of(p.unit) == dimension)
+    return _make_unit(typed_units.most_common(1)[0][0] if typed_units else "", unit)
 
 
 def _make_unit(written: str, unit: str) -> Unit:

@@ -133,11 +133,13 @@ def _ends_faults(parameter_set: ParameterSet, name: str, ends: AnyNumbers, *key:
 
 def _need_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
     """Faults of parameters that may differ from 0 while another parameter, which they need, may be 0."""
-    for name, (needed, otherwise) in parameter_set.needs.items():
-        least = min(_possible_values(problem, parameter_set, needed), default=1.0)
+    for name, (needed_name, reason) in parameter_set.needs.items():
+        least = min(_possible_values(problem, parameter_set, needed_name), default=1.0)
         if least <= 0 and any(_possible_values(problem, parameter_set, name)):
-            message = f"{needed} may be 0 while {name} is not: {otherwise}; keep {needed} above 0, or leave {name} out"
-            yield Fault(message, ("parameters", needed))
+            message = (
+                f"{needed_name} may be 0 while {name} is not: {reason}; keep {needed_name} above 0, or leave {name} out"
+            )
+            yield Fault(message, ("parameters", needed_name))
 
 
 def _possible_values(problem: Stated, parameter_set: ParameterSet, name: str) -> list[float]:
@@ -255,8 +257,8 @@ def _pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[F
         else:
             pattern_of(model, name)
     except ValueError as error:
-        joined = ", or several, joined by +" if model.degree > 4 else ""
-        yield Fault(f"unknown pattern: {error}; {suggest(str(name), patterns_of(model))}{joined}", key)
+        hint = ", or several, joined by +" if model.degree > 4 else ""
+        yield Fault(f"unknown pattern: {error}; {suggest(str(name), patterns_of(model))}{hint}", key)
 
 
 def _expression_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:

@@ -122,8 +122,8 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
         names: parameters of the controller, as `feedback_names` returns them.
     """
     base, has_lag = bicycle.model, LAG in names
-    listed = {n: _GAINS[n] for n in names if n != LAG}
-    places = {gain.place for gain in listed.values()}
+    gains_by_name = {n: _GAINS[n] for n in names if n != LAG}
+    places = {gain.place for gain in gains_by_name.values()}
     driven = tuple(sorted({row for row, _ in places}))
     in_si = base.sets[0].rate is not None  # the native set
 
@@ -133,16 +133,16 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
     def gains(p: AnyNumbers) -> Matrix:
         """G from native parameters."""
         G: Matrix = [[0] * len(_STATES) for _ in _TORQUES]
-        for n, gain in listed.items():
+        for n, gain in gains_by_name.items():
             i, j = gain.place
             G[i][j] = G[i][j] + (p[native(n)] * p[bicycle.speed] if gain.slope else p[native(n)])
         return G
 
     def algebraic(p: AnyNumbers) -> dict[str, Any]:
-        plain, G = base.algebraic(p), gains(p)
+        base_values, G = base.algebraic(p), gains(p)
         gain_entries = {f"G_{i}_{j}": G[i][j] for i, j in places}
         lag = {LAG: p[native(LAG)]} if has_lag else {}
-        return {**plain, **gain_entries, "h": sqrt(1 + plain["T"] * plain["T"]), **lag}
+        return {**base_values, **gain_entries, "h": sqrt(1 + base_values["T"] * base_values["T"]), **lag}
 
     def polynomial(**values: Any) -> list[Any]:
         matrices = bicycle.matrices(values)
@@ -171,10 +171,10 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
         return M, D, K
 
     sets = tuple(_extend_set(s, names, native, feedback) for s in base.sets)
-    removed = {*_PASSIVE, *(("omega0",) if has_lag else ())}
+    removed_names = {*_PASSIVE, *(("omega0",) if has_lag else ())}
     base_advice = {name: advice for name, advice in base.absent.items() if name not in NO_CONTROLLER}
     all_quantities = (*base.quantities, *(q for s in base.sets for q in s.quantities))
-    absent = {q.name: _ABSENT for q in all_quantities if q.name in removed}
+    absent = {q.name: _ABSENT for q in all_quantities if q.name in removed_names}
     absent |= {"push_torque": _NO_PEAK} if has_lag else {}
     return replace(
         base,
@@ -187,7 +187,7 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
         pencil=pencil,
         feedback=feedback,
         natural=False,
-        quantities=tuple(q for q in base.quantities if q.name not in removed),
+        quantities=tuple(q for q in base.quantities if q.name not in removed_names),
         conventions=(*base.conventions, _CONVENTION),
         absent=base_advice | absent,
     )

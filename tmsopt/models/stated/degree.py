@@ -130,15 +130,15 @@ def first_fault(formula: Formula) -> tuple[int, str] | None:
     results: list[Degree | str] = []
     for step in formula.steps:
         operands = [results[k] for k in step.operands]
-        wrong = next((o for o in operands if isinstance(o, str)), "")
+        reason = next((o for o in operands if isinstance(o, str)), "")
         degree = Degree()
         if step.op not in (*DEGREES.operations, CONSTANT, INPUT):
             functions = "sin cos tan asin acos atan sqrt exp log fabs fmin fmax"
-            wrong = wrong or f"uses {step.op}; accepted: + - * / ** and {functions}"
-        elif step.op != INPUT and not wrong:
+            reason = reason or f"uses {step.op}; accepted: + - * / ** and {functions}"
+        elif step.op != INPUT and not reason:
             try:
                 degree = DEGREES.constant(step.value) if step.op == CONSTANT else DEGREES.operations[step.op](*operands)
             except DegreeTooHigh as error:
-                wrong = str(error)
-        results.append(wrong or (degree if degree.number is not None else Degree()))
+                reason = str(error)
+        results.append(reason or (degree if degree.number is not None else Degree()))
     return next(((k, text) for k, o in enumerate(formula.outputs) if isinstance(text := results[o], str)), None)

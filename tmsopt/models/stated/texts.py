@@ -79,8 +79,8 @@ class Texts:
             self.fault(f"found {len(texts)} quantities; accepted: up to {MOST_QUANTITIES}", "quantities")
             texts = {}
         for name, text in texts.items():
-            if why := name_fault(name, bool(self.constants)):
-                self.fault(f"'{name}' {why}; give the quantity a name of its own", "quantities", str(name))
+            if reason := name_fault(name, bool(self.constants)):
+                self.fault(f"'{name}' {reason}; give the quantity a name of its own", "quantities", str(name))
             else:
                 self.expressions[name] = self._parse(text, ("quantities", name), "")
         for _ in range(_MAX_CYCLES):
@@ -99,10 +99,10 @@ class Texts:
     def quantity(self, name: str) -> Any:
         """A quantity as a node that depends on parameters only; the first call builds all quantities."""
         if name not in self.quantity_nodes:
-            for each in self._order or self.expressions:
-                expression = self.expressions[each]
-                self.quantity_nodes[each], self._degrees[each] = (
-                    self._build(expression, ("quantities", each), "") if expression else (0, Degree())
+            for quantity_name in self._order or self.expressions:
+                expression = self.expressions[quantity_name]
+                self.quantity_nodes[quantity_name], self._degrees[quantity_name] = (
+                    self._build(expression, ("quantities", quantity_name), "") if expression else (0, Degree())
                 )
         return self.quantity_nodes[name]
 
@@ -130,8 +130,8 @@ class Texts:
             self.fault(f"{where}{error}", *key)
             return None
         for name in expression.names:
-            if (why := name_fault(name, bool(self.constants))) and name not in self.constants:
-                self.fault(f"{where}'{name}' {why}; give the parameter another name", *key)
+            if (reason := name_fault(name, bool(self.constants))) and name not in self.constants:
+                self.fault(f"{where}'{name}' {reason}; give the parameter another name", *key)
                 return None
         return expression
 

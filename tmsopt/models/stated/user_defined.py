@@ -203,23 +203,23 @@ def _build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: 
     } | {("quantities", str(n)): x for n, x in derived.items()}
     inputs = ca.symvar(ca.vertcat(ca.SX(0, 1), *(x for x in by_place.values() if isinstance(x, ca.SX))))
     symbols = Counter(x.name() for x in inputs)
-    entries = {at: _node(user_key(at[0]), at[1], x) for at, x in by_place.items()}
-    names = formula(entries[at] for at in sort_places(kind, entries)).names
+    entries = {position: _node(user_key(position[0]), position[1], x) for position, x in by_place.items()}
+    names = formula(entries[position] for position in sort_places(kind, entries)).names
     if duplicates := [n for n, count in symbols.items() if count > 1]:
         raise Unfit(key, f"has two symbols named {min(duplicates)}; make one and use it everywhere")
     if not names:
         raise Unfit(key, "names no parameter, so there is nothing to design; write a name in an entry, such as 'k'")
     for n in names:
-        if why := name_fault(n, of_H):
-            raise Unfit(key, f"has a symbol named {n!r}, which {why}; choose another name")
+        if reason := name_fault(n, of_H):
+            raise Unfit(key, f"has a symbol named {n!r}, which {reason}; choose another name")
     for n in derived:
-        if why := "is the name of a parameter" if n in names else name_fault(n, of_H):
-            raise Unfit("quantities", f"{n!r} {why}; choose another name for the quantity")
+        if reason := "is the name of a parameter" if n in names else name_fault(n, of_H):
+            raise Unfit("quantities", f"{n!r} {reason}; choose another name for the quantity")
     shapes = tuple((n, len(rows), len(rows[0])) for n, rows in matrices.items())
     entry_formula = formula(entries.values(), names)
-    if wrong := first_fault(entry_formula):
-        (key, where), why = list(by_place)[wrong[0]], wrong[1]
-        raise Unfit(user_key(key), f"{where}: {why}")
+    if fault := first_fault(entry_formula):
+        (key, where), reason = list(by_place)[fault[0]], fault[1]
+        raise Unfit(user_key(key), f"{where}: {reason}")
     return _build_from_data(kind, name.strip(), shapes, tuple(derived), entry_formula)
 
 

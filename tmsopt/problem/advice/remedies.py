@@ -103,8 +103,8 @@ def replace_limits(problem: Posed, limit_texts: Mapping[str, str]) -> Posed:
     for name, text in limit_texts.items():
         parameter, _, end = name.rpartition(".")
         if name not in problem.constraints:
-            (low, high), new = ends[parameter], text if unit_of(problem, name).text else float(text)
-            ends[parameter] = (low, new) if end == "max" else (new, high)
+            (low, high), end_value = ends[parameter], text if unit_of(problem, name).text else float(text)
+            ends[parameter] = (low, end_value) if end == "max" else (end_value, high)
     constraints = {name: limit_texts.get(name, text) for name, text in problem.constraints.items()}
     return replace(problem.problem, constraints=constraints, free=ends, start={}).posed
 
@@ -112,9 +112,10 @@ def replace_limits(problem: Posed, limit_texts: Mapping[str, str]) -> Posed:
 def _move_limit(problem: Posed, name: str, amount: float, digits: int) -> str:
     if name not in problem.constraints:
         parameter, _, end = name.rpartition(".")
-        up, unit = end == "max", unit_of(problem, name)
-        new = round_outwards((problem.free[parameter][up] + (amount if up else -amount)) / unit.one, up, digits)
-        return f"{new:.{DIGITS}g} {unit.text}".rstrip()
+        is_upper, unit = end == "max", unit_of(problem, name)
+        end_value = problem.free[parameter][is_upper] + (amount if is_upper else -amount)
+        new_limit = round_outwards(end_value / unit.one, is_upper, digits)
+        return f"{new_limit:.{DIGITS}g} {unit.text}".rstrip()
     text = problem.constraints[name]
     left, sign, right = written_sides(text)
     limit = split_limit(text)
@@ -122,7 +123,7 @@ def _move_limit(problem: Posed, name: str, amount: float, digits: int) -> str:
         increase = round_outwards(abs(amount), True, digits)
         return f"{left} {sign} {right} {'-' if sign == '>=' or amount < 0 else '+'} {increase:.{DIGITS}g}"
     change = -amount if (sign == ">=") == bool(limit.before) else amount
-    new, negligible = limit.value + change, _NEGLIGIBLE * abs(limit.value)
+    new_limit, negligible = limit.value + change, _NEGLIGIBLE * abs(limit.value)
     return limit.replace_number(
-        f"{round_outwards(new, change > 0, digits) if abs(new) > negligible else 0.0:.{DIGITS}g}"
+        f"{round_outwards(new_limit, change > 0, digits) if abs(new_limit) > negligible else 0.0:.{DIGITS}g}"
     )

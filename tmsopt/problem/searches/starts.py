@@ -77,8 +77,8 @@ class Starts:
         """
         if not self.tried:
             return ()
-        by = f"found from {self.at_best} of {self.tried} start{'' if self.tried == 1 else 's'}"
+        origin = f"found from {self.at_best} of {self.tried} start{'' if self.tried == 1 else 's'}"
         if self.at_best and self.suffice():
-            return (by,)
-        likely = self.at_best == 1 and not expects_few_better(self.converged, self.optima, _LIKELY_BETTER)
-        return by, f"a better design is {'likely' if likely else 'possible'}"
+            return (origin,)
+        is_likely = self.at_best == 1 and not expects_few_better(self.converged, self.optima, _LIKELY_BETTER)
+        return origin, f"a better design is {'likely' if is_likely else 'possible'}"

@@ -39,9 +39,9 @@ class Dimension:
     @property
     def unit(self) -> str:
         """The unit as text; ``1`` if there is none."""
-        above = " ".join(_power_text(n, p) for n, p in self.powers if p > 0)
-        below = " ".join(_power_text(n, -p) for n, p in self.powers if p < 0)
-        text = f"{above or '1'}/{below}" if below else above or "1"
+        numerator = " ".join(_power_text(n, p) for n, p in self.powers if p > 0)
+        denominator = " ".join(_power_text(n, -p) for n, p in self.powers if p < 0)
+        text = f"{numerator or '1'}/{denominator}" if denominator else numerator or "1"
         return _BASE_UNITS_TO_NAMES.get(text, text)
 
 

@@ -116,13 +116,13 @@ def roots_to_json(solution: Any) -> dict[str, Any]:
     Args:
         solution: an object with `roots`, `eigenfrequencies`, `meetings` and `stability`.
     """
-    growing: str = solution.stability.growth
+    growth_power: str = solution.stability.growth
     data: dict[str, Any] = {}
     largest_re = max((m.re for m in solution.meetings if m.longest > 1), default=math.nan)
     tolerance = _LINE * max((r.size for r in solution.roots), default=0.0)  # a root of 1e-17 is shown as 0
 
     def chain_facts(m: MultipleRoot) -> dict[str, Any]:
-        growth = {"growth": power_of_t(m.longest)} if growing and m.re == largest_re and m.longest > 1 else {}
+        growth = {"growth": power_of_t(m.longest)} if growth_power and m.re == largest_re and m.longest > 1 else {}
         return {"defective": m.defective, "geometric_multiplicity": m.geometric, **growth}
 
     for name, entries in plain(solution, "roots eigenfrequencies").items():
@@ -145,8 +145,8 @@ def describe_stability(verdict: StabilityVerdict, *, exact: bool, of_matrices: b
     if not verdict.on_edge:
         return verdict.verdict
     root = "real eigenfrequency" if of_H else "root on the imaginary axis"
-    why = f"from a defective {root}" if of_matrices else "as the solutions of p(d/dt) y = 0 do"
-    words = f"growing as {verdict.growth}, {why}" if verdict.growth else verdict.verdict
+    reason = f"from a defective {root}" if of_matrices else "as the solutions of p(d/dt) y = 0 do"
+    words = f"growing as {verdict.growth}, {reason}" if verdict.growth else verdict.verdict
     return words if exact else f"{words}{ROUNDED}"
 
 

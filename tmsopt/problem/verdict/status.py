@@ -28,8 +28,8 @@ def describe_status(solution: "Solution") -> str:
         return "none found" if problem.posed.sense == "locate" else "not converged, so a better design may be near"
     if problem.posed.objective is None or not problem.free:
         return "found" if problem.free else "as given"
-    unproved = "stopped before it was proved" if solution.interrupted else "not proved"
-    evidence = ["proved"] if bound.proven else [*solution.starts.sureness, unproved]
+    doubt = "stopped before it was proved" if solution.interrupted else "not proved"
+    evidence = ["proved"] if bound.proven else [*solution.starts.sureness, doubt]
     return f"optimal ({', '.join(evidence)})"
 
 
@@ -39,12 +39,12 @@ def describe_verdict(solution: "Solution") -> str:
     located_none = problem.posed.sense == "locate" and solution.status == "not_converged"
     if located_none or (solution.status == "infeasible" and any_stable is not False):
         return ""
-    limited = problem.locate or len(problem.constraints) > len(problem.posed.asked_of_roots)
-    limits = " and satisfies the constraints" if limited else ""
+    is_limited = problem.locate or len(problem.constraints) > len(problem.posed.asked_of_roots)
+    limits = " and satisfies the constraints" if is_limited else ""
     proof = f"no design within the ranges is stable{limits} (proved)"
     doubt = "" if solution.interrupted else "no stable design was found, but not proved that none exists"
     remark = proof if any_stable is False else doubt
-    sought = solution.stability_sought and not any_stable
+    is_sought = solution.stability_sought and not any_stable
     if stability.verdict != UNSTABLE:
         model = problem.model
         words = describe_stability(
@@ -53,10 +53,10 @@ def describe_verdict(solution: "Solution") -> str:
             of_matrices=model.pencil is not None,
             of_H=model.carrier is not None,
         )
-        return f"{words}; {remark}" if stability.on_edge and sought and remark else words
+        return f"{words}; {remark}" if stability.on_edge and is_sought and remark else words
     if any_stable:
         return "not stable, although some designs within the ranges are stable"
-    if not (any_stable is False or (sought and remark)):
+    if not (any_stable is False or (is_sought and remark)):
         return "not stable"
     return remark if solution.status == "infeasible" else f"not stable: {remark}"
 
