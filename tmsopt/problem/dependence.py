@@ -44,8 +44,9 @@ def depends_on_case(problem: Posed, expression: Expression, cases: Sequence[Case
 def needs_two_sided_bounds(problem: Posed) -> bool:
     """Whether one-sided bounds on root quantities would make the problem easier than it is.
 
-    The factors bound the abscissa and the angular frequency from above and the damping ratio from below. These
-    bounds are exact if the objective and the constraints do not improve as those two grow or the ratio falls.
+    The nonlinear program writes the polynomial as a product of factors. Their constraints bound the abscissa and the
+    angular frequency from above and the damping ratio from below. These bounds are exact if the objective and the
+    constraints do not improve as the first two grow or the damping ratio falls.
     """
     return any(rewards_change_of(problem, name, worse) for name, worse in WORSE_DIRECTION.items())
 
@@ -57,7 +58,7 @@ def rewards_change_of(problem: Posed, name: str, worse: float = 1.0) -> bool:
 
 
 def stability_limit(problem: Posed, least_decay: float = _LEAST_DECAY) -> dict[str, str]:
-    """Name → a constraint that keeps designs stable; empty if neither limits nor objective require stability.
+    """Name → a constraint that keeps designs stable; empty if neither the limits nor the objective require it.
 
     It allows roots on the imaginary axis if the limits allow them and the objective does not depend on the roots.
 
@@ -137,10 +138,10 @@ def _find_dependencies(model: Model, set_name: str, expression: Expression) -> f
     parameter_set = model.parameter_set(set_name)
     extra = (*ROOT_QUANTITIES, NO_RADIUS)
 
-    def stand_in(quantity: Quantity, values: Values) -> Any:
+    def root_symbol(quantity: Quantity, values: Values) -> Any:
         """A symbol for a root quantity; None for other quantities."""
         return symbol(quantity.name) if quantity.name in ROOT_NAMES else None
 
     symbols = {name: symbol(name) for name in parameter_set.names}
-    values = Values(model, parameter_set, symbols, extra=extra, lift=stand_in)
+    values = Values(model, parameter_set, symbols, extra=extra, lift=root_symbol)
     return frozenset(formula([expression(values)]).inputs) & frozenset(parameter_set.names)

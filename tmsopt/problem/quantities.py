@@ -20,12 +20,10 @@ STRUCTURE_TOLERANCE = 1e-11
 SIMPLE = ("real", "pair", "undecided")
 """Names of structures without multiple roots, whose roots are computed numerically."""
 
-_SCATTER, _ROUNDING = (
-    1e-11,
-    4 * np.finfo(float).eps,
-)  # roots of larger relative error are computed exactly; rounding error of a term
+_MAX_ERROR = 1e-11  # roots with a larger relative error are computed exactly
+_ROUNDING = 4 * np.finfo(float).eps  # relative rounding error of a term of a polynomial
 
-_DIGITS = 120  # so that products of five doubles are exact
+_DIGITS = 120  # decimal digits in which products of five doubles are exact
 
 _CACHE_SIZE = 64  # structures in the cache, because several quantities of a design use its structure
 
@@ -35,12 +33,12 @@ _LARGEST_ROOT = 1e50
 
 def _may_have_huge_roots(a: Array) -> Any:
     """Whether the leading coefficient is 0, or so small that a root may be too large for doubles."""
-    ends = np.abs(a[..., 0]) * _LARGEST_ROOT <= np.abs(a).max(axis=-1)
-    if ends.any():
+    is_huge = np.abs(a[..., 0]) * _LARGEST_ROOT <= np.abs(a).max(axis=-1)
+    if is_huge.any():
         with np.errstate(all="ignore"):
             sizes = np.abs(a[..., 1:] / a[..., :1]) ** (1 / np.arange(1, a.shape[-1]))
-        ends &= ~(sizes.max(axis=-1) < _LARGEST_ROOT)  # also true for nan, if all are 0
-    return ends
+        is_huge &= ~(sizes.max(axis=-1) < _LARGEST_ROOT)  # also true for nan, if all are 0
+    return is_huge
 
 
 def _structure(values: AnyNumbers) -> Structure:
@@ -54,12 +52,12 @@ def _structure(values: AnyNumbers) -> Structure:
         return undecided  # a0 may be 0 within rounding
     root_structure = _cached_structure(tuple(a), tuple(map(float, roundings)))
     is_simple = root_structure.name in SIMPLE and all(root.multiplicity == 1 for root in root_structure.roots)
-    if is_simple and _scatter(np.array(a), root_structure) > _SCATTER:
+    if is_simple and _root_error(np.array(a), root_structure) > _MAX_ERROR:
         root_structure = replace(root_structure, roots=roots_at(*values.given) or root_structure.roots)
     return root_structure
 
 
-def _scatter(a: Array, root_structure: Structure) -> float:
+def _root_error(a: Array, root_structure: Structure) -> float:
     """Rounding error of simple numeric roots, relative to the largest root."""
     z = np.array([complex(root.re, root.im) for root in root_structure.roots])
     terms, slope = np.polyval(np.abs(a), np.abs(z)), np.abs(np.polyval(np.polyder(a), z))

@@ -31,7 +31,7 @@ _TORQUES = {
     "k": "steer torque",
 }  # in the order of the rows of M, D, K
 _STATE_ORDER = ("phi", "phidot", "delta", "deltadot")
-_STEER = tuple(f"k_{x}" for x in _STATE_ORDER)
+_STEER_GAINS = tuple(f"k_{x}" for x in _STATE_ORDER)
 
 
 class _Gain(NamedTuple):
@@ -61,9 +61,11 @@ _GAINS = {
 FEEDBACK = (*_GAINS, LAG)
 """Names of the parameters in the table [feedback], in SI."""
 
-_PASSIVE = ("v_weave", "v_capsize", "Fr_c", "v_c")
-_ABSENT = "its formula holds without a controller only; run `tmsopt speeds` for the stable speeds of this bicycle"
-_NO_PEAK = "with a lag the torque starts at 0; run `tmsopt simulate` for its peak after a push"
+_UNCONTROLLED_QUANTITIES = ("v_weave", "v_capsize", "Fr_c", "v_c")
+_ABSENT_ADVICE = (
+    "its formula holds without a controller only; run `tmsopt speeds` for the stable speeds of this bicycle"
+)
+_NO_PEAK_ADVICE = "with a lag the torque starts at 0; run `tmsopt simulate` for its peak after a push"
 _CONVENTION = (
     "A controller adds the steer torque −(k_phi φ + k_phidot φ′ + k_delta δ + k_deltadot δ′), to the right positive."
 )
@@ -112,7 +114,7 @@ def feedback_names(names: Iterable[str]) -> tuple[str, ...]:
     """The names of [feedback] among `names`, SI or dimensionless; with any of them also the four steer torque gains."""
     given_names = set(names)
     used_names = {n for n in FEEDBACK if n in given_names or native_name(n) in given_names}
-    return tuple(n for n in FEEDBACK if n in used_names or (used_names and n in _STEER))
+    return tuple(n for n in FEEDBACK if n in used_names or (used_names and n in _STEER_GAINS))
 
 
 def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
@@ -171,11 +173,11 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
         return M, D, K
 
     sets = tuple(_extend_set(s, names, native, feedback) for s in base.sets)
-    removed_names = {*_PASSIVE, *(("omega0",) if has_lag else ())}
+    removed_names = {*_UNCONTROLLED_QUANTITIES, *(("omega0",) if has_lag else ())}
     base_advice = {name: advice for name, advice in base.absent.items() if name not in NO_CONTROLLER}
     all_quantities = (*base.quantities, *(q for s in base.sets for q in s.quantities))
-    absent = {q.name: _ABSENT for q in all_quantities if q.name in removed_names}
-    absent |= {"push_torque": _NO_PEAK} if has_lag else {}
+    absent = {q.name: _ABSENT_ADVICE for q in all_quantities if q.name in removed_names}
+    absent |= {"push_torque": _NO_PEAK_ADVICE} if has_lag else {}
     return replace(
         base,
         title=f"{base.title} with a controller",
@@ -233,7 +235,7 @@ def _extend_set(
     gain_parameters = tuple(
         replace(_parameter(n, _unit(n), n), counterpart="" if native(n) == n else native(n)) for n in names
     )
-    quantities = tuple(q for q in base.quantities if q.name not in _PASSIVE)
+    quantities = tuple(q for q in base.quantities if q.name not in _UNCONTROLLED_QUANTITIES)
     all_parameters = (*base.parameters, *gain_parameters)
 
     def torques(v: AnyNumbers) -> Feedback:

@@ -108,7 +108,7 @@ _SI = ParameterSet(
 )
 _IN_SI = {q.name: q for q in (*_SI_QUANTITIES, *quantities(_TABLES["quantities"]["shown"]))}
 
-_ABSENT = {
+_ABSENT_ADVICE = {
     "trail": "skates have no trail; the distance of the front mass from the steer axis is nu_H, or u_H in SI: write "
     "'nu_H >= 0.02' or 'u_H >= 0.02'; for wheels and a trail, c, choose model = \"whipple\"",
 }
@@ -129,7 +129,7 @@ tms = Model(
     omits="two point masses on skates, without wheels, rotational inertia or trail",
     conventions=CONVENTIONS,
     sketch=TMS,
-    absent=_ABSENT | NO_CONTROLLER,
+    absent=_ABSENT_ADVICE | NO_CONTROLLER,
 )
 """The two-mass-skate bicycle."""
 

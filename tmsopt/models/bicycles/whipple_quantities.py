@@ -11,14 +11,14 @@ from tmsopt.models.bicycles.whipple_equations import matrices, powers_of_speed, 
 from tmsopt.models.model import Matrix
 from tmsopt.records import AnyNumbers
 
-_LARGE = 1e300  # above every relevant v²/g
+_LARGE = 1e300  # stands for "no root"; greater than every v²/g of interest
 
 IN_MATRICES = tuple(signature(matrices).parameters)[:-3]
 """Algebraic parameters except T, v and g: lengths, masses, inertias and spins."""
 
 
 def spin(I_yy: Any, r: Any) -> Any:
-    """Angular momentum I_yy/r of a rolling wheel at a speed of 1; 0 for a wheel without inertia, at any radius.
+    """Angular momentum I_yy/r of a rolling wheel at a speed of 1; 0 for a wheel without inertia and any radius.
 
     I_yy ≤ m r², so the spin vanishes with the radius. A wheel with inertia but without radius would turn infinitely
     fast, so its spin is nan.
@@ -57,7 +57,7 @@ def canonical(p: AnyNumbers) -> tuple[Matrix, Matrix, Matrix, Matrix]:
 
 
 def _sine_cosine(p: AnyNumbers) -> tuple[Any, Any]:
-    """From tan λ_s alone: cos λ_s = 1/√(1 + tan² λ_s), because tilts lie in (−π/2, π/2)."""
+    """Sine and cosine of λ_s from tan λ_s: cos λ_s = 1/√(1 + tan² λ_s) is positive, because |λ_s| < π/2."""
     T = tan(p["lambda_s"])
     cosine = 1 / sqrt(1 + T * T)
     return T * cosine, cosine
