@@ -65,7 +65,9 @@ def unit_of(problem: Posed, text: str) -> Unit:
     names = set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name)))
     if units.get(_FREQUENCY) == _HERTZ and names == {_FREQUENCY}:
         return Unit(_HERTZ)
-    return _usual_unit(problem, Dimension.of(units[name]) if name in units else dimension_of(problem, text, units))
+    return _usual_unit(
+        problem, Dimension.from_unit(units[name]) if name in units else dimension_of(problem, text, units)
+    )
 
 
 def rate_of(problem: Posed, text: str, parameters: AnyNumbers) -> Any:
@@ -163,7 +165,7 @@ def _usual_unit(problem: Posed, dimension: Dimension) -> Unit:
     """The unit that most parameters of a dimension were typed in."""
     parameter_set, unit = problem.parameter_set, dimension.unit
     parameters = (p for p in parameter_set.parameters if p.name in problem.units)
-    typed_units = Counter(problem.units[p.name] for p in parameters if Dimension.of(p.unit) == dimension)
+    typed_units = Counter(problem.units[p.name] for p in parameters if Dimension.from_unit(p.unit) == dimension)
     return _make_unit(typed_units.most_common(1)[0][0] if typed_units else "", unit)
 
 

@@ -28,7 +28,7 @@ class Dimension:
     number: float = field(default=math.nan, compare=False)
 
     @classmethod
-    def of(cls, unit: str) -> "Dimension":
+    def from_unit(cls, unit: str) -> "Dimension":
         """The dimension of a unit such as ``kg m^2`` or ``1/s``."""
         parts = zip((1, -1), (_UNITS_IN_BASE_UNITS.get(unit, unit) + "/").split("/"), strict=False)
         factors = [(factor, sign) for sign, part in parts for factor in _POWERS.finditer(part) if factor["name"] != "1"]
@@ -78,7 +78,7 @@ UNITS = Kind(
         "sqrt": lambda a: _multiply((a, Fraction(1, 2))),
         "pow": _raise_power,
         **dict.fromkeys(("sin", "cos", "tan", "exp", "log"), lambda a: Dimension()),
-        **dict.fromkeys(("asin", "acos", "atan"), lambda a: Dimension.of("rad")),
+        **dict.fromkeys(("asin", "acos", "atan"), lambda a: Dimension.from_unit("rad")),
     },
     lambda x: Dimension(number=float(as_double(x))),
 )
@@ -91,5 +91,5 @@ def _power_text(name: str, p: Fraction) -> str:
 
 def dimension(expression: Expression, units: Mapping[str, str]) -> Dimension:
     """The dimension of an expression, or of both sides of a comparison, for the units of its names."""
-    result: Dimension = expression.of({n: Dimension.of(units.get(n, "1")) for n in expression.names}, UNITS)
+    result: Dimension = expression.of({n: Dimension.from_unit(units.get(n, "1")) for n in expression.names}, UNITS)
     return result
