@@ -48,7 +48,7 @@ _TABLES = {
 
 
 def shape_faults(problem: Stated) -> Iterator[Fault]:
-    """Arguments of a wrong type, and tables that are too large."""
+    """Faults of arguments that have a wrong type, and of tables that are too large."""
     if not isinstance(problem.model, Model):
         accepted = "a model, such as tmsopt.models.tms"
         yield Fault(f"found {type(problem.model).__name__}; accepted: {accepted}", ("model",))
@@ -70,7 +70,7 @@ def _size_faults(what: str, values: Any, *key: str) -> Iterator[Fault]:
 
 
 def find_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
-    """Every fault of a problem whose arguments have the right types and whose names are of a parameter set."""
+    """Every fault of a problem in the parameters of a set; the arguments must have the right types."""
     checks = (_name_faults, _value_faults, _need_faults, _variation_faults, _objective_faults, _expression_faults)
     return chain.from_iterable(check(problem, parameter_set) for check in checks)
 
