@@ -18,10 +18,10 @@ _REPAIRS: tuple[Repair, ...] = (
     (r"(?<![<>=!])=(?!=)", "=="),
     (r"([<>])(?!=)", r"\1="),
     (r"(?<=\d),(?=\d)", "."),
-    (_NUMBER + r"\s*%", lambda found: f"{float(found[1]) / 100:.12g}"),
+    (_NUMBER + r"\s*%", lambda match: f"{float(match[1]) / 100:.12g}"),
     (_NUMBER + r"\s*(?:°|deg\b|degrees?\b)", r"\1*pi/180"),
     (_NUMBER + r"\s*rad\b", r"\1"),
-    (_NUMBER + rf"\s*({'|'.join(_UNITS)})\b(?!\s*/)", lambda found: f"{float(found[1]) * _UNITS[found[2]]:.12g}"),
+    (_NUMBER + rf"\s*({'|'.join(_UNITS)})\b(?!\s*/)", lambda match: f"{float(match[1]) * _UNITS[match[2]]:.12g}"),
     (_NUMBER + r"\s*(?=(?!j\b)[A-Za-z(])", r"\1*"),
 )
 """Pattern of a foreign notation → its replacement, applied in this order."""
@@ -30,17 +30,17 @@ _WITH_UNIT = re.compile(_NUMBER + rf"\s*({'|'.join(_UNITS)}|deg|°)(?!\w)")
 
 
 def call_advice(name: str, arguments: Iterable[str]) -> str:
-    """The end of a message about an unknown function: what to write instead; empty if unknown."""
+    """The end of a message about an unknown function: what to write instead; empty without advice."""
     functions = _WORDS["functions"]
     advised = f"write {functions[name]}" if name in functions else AMBIGUOUS_NAMES["t"] if "t" in arguments else ""
     return f"; {advised}" if advised else ""
 
 
 def advice(text: str, parses: Callable[[str], bool]) -> str:
-    """The end of a message about a text that does not parse: what to write instead; empty if unknown.
+    """The end of a message about a text that does not parse: what to write instead; empty without advice.
 
     Args:
-        parses: whether a text parses.
+        parses: function that returns whether a text parses.
     """
     if re.search(r"\d[jJ]\b", text):
         return "; expressions are real: write real and imaginary part as two numbers; only the matrix H may be complex"

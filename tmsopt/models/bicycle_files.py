@@ -19,23 +19,23 @@ from tmsopt.records import Numbers, Table
 _SI = whipple.sets[0]
 _FILE_NAMES = {p.name: "lam" if p.name == "lambda_s" else p.name.replace("_", "") for p in _SI.parameters}
 _MODEL_NAMES = {written: name for name, written in _FILE_NAMES.items()}
-_NO_PART = ("IByy", "IHyy", "yB", "yH", "yR", "yF")
+_NAMES_WITHOUT_EFFECT = ("IByy", "IHyy", "yB", "yH", "yR", "yF")
 """Names in the files on which the linear motion does not depend."""
 
-_IGNORED = (
+_REDUNDANT_NAMES = (
     *("IRzz", "IFzz"),  # equal to IRxx, IFxx for round wheels
     *("d1", "d2", "d3"),  # the geometry in other parameters
     *("xcl", "zcl"),  # point of action of a lateral force
     *(f"{symbol}{part}" for part in "GS" for symbol in ("m", "x", "z")),  # handlebar, fork
     *(f"I{part}{axes}" for part in "GS" for axes in ("xx", "yy", "zz", "xz")),
 )
-"""Names in some files that add nothing about the linear motion."""
+"""Names in some files that give no further information about the linear motion."""
 
-_OTHERS = (*_NO_PART, *_IGNORED)
-_OPTIONAL = ("v", "g")
-_YAML = (".yml", ".yaml")
-_TEXT = (".txt", ".ini")
-_KINDS = ("benchmark", "meijaard2007")
+_UNUSED_NAMES = (*_NAMES_WITHOUT_EFFECT, *_REDUNDANT_NAMES)
+_OPTIONAL_NAMES = ("v", "g")
+_YAML_SUFFIXES = (".yml", ".yaml")
+_TEXT_SUFFIXES = (".txt", ".ini")
+_PARAMETERIZATIONS = ("benchmark", "meijaard2007")
 
 _NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?"
 _MEASURED = re.compile(
@@ -67,10 +67,10 @@ class Bicycle:
     others: Table[float] = Table()
 
     def tolerances(self, deviations: float = 2.0, most: int = 8) -> dict[str, float]:
-        """`deviations` standard deviations of the `most` relatively least certain parameters, as tolerances."""
-        share = {n: u / (abs(self.parameters[n]) or math.inf) for n, u in self.uncertainties.items()}
-        chosen = sorted(share, key=lambda n: -share[n])[:most]
-        return {n: deviations * self.uncertainties[n] for n in self.parameters if n in chosen}
+        """Tolerances of `deviations` standard deviations for the `most` parameters of largest relative deviation."""
+        relative_deviations = {n: u / (abs(self.parameters[n]) or math.inf) for n, u in self.uncertainties.items()}
+        names = sorted(relative_deviations, key=lambda n: -relative_deviations[n])[:most]
+        return {n: deviations * self.uncertainties[n] for n in self.parameters if n in names}
 
 
 def read_bicycle(path: str | PathLike[str]) -> Bicycle:
@@ -90,46 +90,47 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     More: docs/how_to/import.md
     """
     file = as_path(path, "a file of bicycle parameters")
-    kind = "YAML" if file.suffix.lower() in _YAML else "TXT"
+    kind = "YAML" if file.suffix.lower() in _YAML_SUFFIXES else "TXT"
     text = read_text(str(path), f"{kind} file of bicycle parameters")
     entries = list(_entries(text, kind == "YAML"))
-    faults, found, deviations, others = [], {}, {}, {}
+    faults, parameters, deviations, other_numbers = [], {}, {}, {}
     advice = limit_advice(suggest)
     for number, name, written in entries:
         numbers, message = _numbers(written), ""
         if kind == "YAML" and name == "parameterization":
-            if written.strip("'\" ").lower() not in _KINDS:
+            if written.strip("'\" ").lower() not in _PARAMETERIZATIONS:
                 message = f"found the parameterization {short(written)}; accepted: Meijaard2007 or benchmark"
-        elif name not in _MODEL_NAMES and name not in _OTHERS:
-            message = f"unknown name {short(name)}; {advice(name, [*_MODEL_NAMES, *_NO_PART])}"
+        elif name not in _MODEL_NAMES and name not in _UNUSED_NAMES:
+            message = f"unknown name {short(name)}; {advice(name, [*_MODEL_NAMES, *_NAMES_WITHOUT_EFFECT])}"
         elif numbers is None:
             message = (
                 f"{name}: found {short(written)}; "
                 "accepted: a number, with +/- its uncertainty, or several between commas"
             )
-        elif name in _OTHERS:
-            others[name] = numbers[0]
+        elif name in _UNUSED_NAMES:
+            other_numbers[name] = numbers[0]
         else:
-            found[_MODEL_NAMES[name]], deviations[_MODEL_NAMES[name]] = numbers
+            parameters[_MODEL_NAMES[name]], deviations[_MODEL_NAMES[name]] = numbers
         if message:
             faults.append(Fault(message).at(str(path), number))
-    reported = {name for _, name, _ in entries}
-    if missing := [w for n, w in _FILE_NAMES.items() if w not in reported and n not in _OPTIONAL]:
-        raw = "These are raw measurements; make the Benchmark file with BicycleParameters." if "hbb" in reported else ""
-        faults.append(Fault(f"missing: {', '.join(missing)}. {raw}".strip(), file=str(path)))
-    for name, value in found.items():
+    names_in_file = {name for _, name, _ in entries}
+    if missing := [w for n, w in _FILE_NAMES.items() if w not in names_in_file and n not in _OPTIONAL_NAMES]:
+        hint = "These are raw measurements; make the Benchmark file with BicycleParameters."
+        message = f"missing: {', '.join(missing)}. {hint if 'hbb' in names_in_file else ''}"
+        faults.append(Fault(message.strip(), file=str(path)))
+    for name, value in parameters.items():
         if value not in (parameter := _SI[name]).range:
             message = f"{_FILE_NAMES[name]} = {value:.6g} is not physical"
             accepted = f"accepted: {parameter.range} ({parameter.meaning})"
             faults.append(Fault(f"{message}; {accepted}", file=str(path)))
     if faults:
         raise InputError(faults)
-    ordered = {n: found[n] for n in _SI.names if n in found}
+    ordered_parameters = {n: parameters[n] for n in _SI.names if n in parameters}
     return Bicycle(
         escape_unprintable(file.stem),
-        Table(ordered),
-        Table({n: deviations[n] for n in ordered if deviations[n] > 0}),
-        Table(others),
+        Table(ordered_parameters),
+        Table({n: deviations[n] for n in ordered_parameters if deviations[n] > 0}),
+        Table(other_numbers),
     )
 
 
@@ -153,28 +154,32 @@ def write_bicycle(bicycle: Bicycle | Numbers, path: str | PathLike[str]) -> None
     More: docs/how_to/import.md
     """
     file = as_path(path, "the file to write")
-    ending = file.suffix.lower()
-    if ending not in (*_TEXT, *_YAML):
-        raise InputError([Fault(f"found '{path}'; accepted: a file name ending in {', '.join((*_TEXT, *_YAML))}")])
-    own = bicycle if isinstance(bicycle, Bicycle) else Bicycle(file.stem, Table(bicycle))
+    suffix = file.suffix.lower()
+    if suffix not in (*_TEXT_SUFFIXES, *_YAML_SUFFIXES):
+        accepted = f"a file name ending in {', '.join((*_TEXT_SUFFIXES, *_YAML_SUFFIXES))}"
+        raise InputError([Fault(f"found '{path}'; accepted: {accepted}")])
+    record = bicycle if isinstance(bicycle, Bicycle) else Bicycle(file.stem, Table(bicycle))
     defaults = {p.name: p.default for p in _SI.parameters if p.default is not None}
-    values = {**defaults, **own.parameters}
-    missing = [n for n in _SI.names if n not in values and n not in _OPTIONAL]
+    values = {**defaults, **record.parameters}
+    missing = [n for n in _SI.names if n not in values and n not in _OPTIONAL_NAMES]
     if missing:
         raise InputError([Fault(f"missing parameter {', '.join(missing)}", ("parameters",))])
     numbers = {w: values[n] for n, w in _FILE_NAMES.items() if n in values}
-    numbers |= {n: float(own.others.get(n, 0.0)) for n in ("IByy", "IHyy")}
-    deviations = {_FILE_NAMES[n]: f"+/-{_decimal(u)}" for n, u in own.uncertainties.items() if u}
-    if ending in _TEXT:
+    numbers |= {n: float(record.others.get(n, 0.0)) for n in ("IByy", "IHyy")}
+    deviations = {_FILE_NAMES[n]: f"+/-{_decimal(u)}" for n, u in record.uncertainties.items() if u}
+    if suffix in _TEXT_SUFFIXES:
         lines = [f"{n} = {_decimal(x)}{deviations.get(n, '')}" for n, x in sorted(numbers.items())]
     else:
-        head = ["parameterization: Meijaard2007", f"parameters: {_quote(own.name)}", "rider: null", "description: ''"]
+        name = _quote(record.name)
+        head = ["parameterization: Meijaard2007", f"parameters: {name}", "rider: null", "description: ''"]
         lines = [*head, "values:", *(f"  {n}: {_decimal(x)}" for n, x in sorted(numbers.items()))]
     write_text(file, "\n".join(lines) + "\n")
 
 
 def problem_text(bicycle: Bicycle, speed: float | None = None) -> str:
-    """A problem file of a bicycle with every parameter fixed, at `speed`, its own speed, or else 5 m/s.
+    """The text of a problem file for a bicycle with every parameter fixed.
+
+    The speed is `speed`, or else the speed of the bicycle, or else 5 m/s.
 
     Example:
         >>> own = tmsopt.Bicycle("mine", tmsopt.load("problems/whipple_benchmark.toml").fixed)
@@ -193,7 +198,7 @@ def problem_text(bicycle: Bicycle, speed: float | None = None) -> str:
 
 
 def _entries(text: str, in_yaml: bool) -> Iterator[tuple[int, str, str]]:
-    """Line number, name and value of each entry; in YAML under ``values:``, or at the top level."""
+    """Line number, name and value of each entry. YAML files have the entries under ``values:``, or at the top level."""
     nested, section = in_yaml and re.search(r"^values\s*:", text, re.MULTILINE), ""
     for number, line in enumerate(text.splitlines(), start=1):
         content = re.split(r"(?:^|\s)#" if in_yaml else "#", line, maxsplit=1)[0].rstrip()
@@ -207,7 +212,7 @@ def _entries(text: str, in_yaml: bool) -> Iterator[tuple[int, str, str]]:
 
 
 def _numbers(written: str) -> tuple[float, float] | None:
-    """Mean of the values and its standard deviation; None if a value is not a number."""
+    """The mean of the values and the standard deviation of the mean; None if a value is not a number."""
     values, deviations = [], []
     for part in written.split(","):
         if (match := _MEASURED.fullmatch(part.strip())) is None:

@@ -19,10 +19,10 @@ from tmsopt.models.model import Model, ParameterSet
 from tmsopt.records import AnyNumbers, Numbers, Table
 
 SAME = 4e-15
-"""Accepted relative difference of an exact value from the double of the design: a few roundings, also of a tangent."""
+"""Greatest accepted relative difference between an exact value and the double of the design: a few rounding errors."""
 
 MOST_DIGITS = 400
-"""Most digits of an exact number; doubles have up to 309 before the point."""
+"""Greatest number of digits of an exact number; doubles have up to 309 digits before the point."""
 
 _POWER_OF_TEN = re.compile(r"[eE]([+-]?[\d_]+)")
 _DEGREES = re.compile(r"(.*?)\s*(?:deg|°)")
@@ -51,7 +51,7 @@ class Exact:
         return self.node.fraction
 
     def ball(self) -> Any:
-        """The number, an angle in radians, as a ball at the working precision."""
+        """The number as a ball (an interval with midpoint and radius) of the working precision, angles in radians."""
         return flint.arb(fold(formula([self.node]), {}, BALLS)[0])
 
     def times(self, factor: Fraction) -> "Exact":
@@ -61,7 +61,7 @@ class Exact:
         return self if factor == 1 else Exact(self.node * factor, f"({self.text})*{factor}")
 
     def to_radians(self) -> "Exact":
-        """The number of degrees as an angle in radians."""
+        """The angle in radians, if the number is an angle in degrees."""
         return Exact(self.node * PI / 180, f"{self.text} deg") if self.fraction != 0 else self
 
     def __float__(self) -> float:
@@ -87,10 +87,10 @@ def constant(text: str) -> Exact:
         expression = parse_value(text, (), "8/3")
         exact = Exact(fold(expression.formula, {}, NODES)[0], expression.text)
         with flint.ctx.workdps(DIGITS):
-            found = fold(expression.formula, {}, BALLS)[0]
-        if isinstance(found, flint.fmpq):
-            exact = Exact.from_fraction(Fraction(int(found.p), int(found.q)))
-        elif not found.is_finite():
+            value = fold(expression.formula, {}, BALLS)[0]
+        if isinstance(value, flint.fmpq):
+            exact = Exact.from_fraction(Fraction(int(value.p), int(value.q)))
+        elif not value.is_finite():
             raise ValueError(f"'{text}' has no value") from None
     if not math.isfinite(float(exact)) or (float(exact) == 0 and exact.fraction):
         raise ValueError(f"'{text}' is a number beyond double precision")
@@ -98,13 +98,13 @@ def constant(text: str) -> Exact:
 
 
 def number(x: float, text: str = "") -> Node:
-    """A double in a formula: the number that was typed for it, or without a text the decimal that prints it."""
+    """A double as a node of a formula: the exact number in `text`, or without a text its shortest decimal."""
     typed = _parse(text, angle=True) if text else None
     return typed.node if typed else node_of(float(x))
 
 
 def decimal(x: Any) -> Fraction:
-    """A number as the user wrote it: a double stands for the shortest decimal that prints it, so 0.1 is 1/10.
+    """A number as the user wrote it. A double means its shortest decimal, so 0.1 is 1/10.
 
     Raises:
         ValueError: if it is not a number, or has more than 400 digits.
@@ -119,10 +119,10 @@ def decimal(x: Any) -> Fraction:
         power = _POWER_OF_TEN.search(x[:MOST_DIGITS])
         if len(x) > MOST_DIGITS or (power and abs(int(power[1])) > MOST_DIGITS):  # before a slow conversion
             raise ValueError("too many digits")
-    found = Fraction(repr(float(x))) if isinstance(x, float) else Fraction(x)
-    if _is_long(found):
+    fraction = Fraction(repr(float(x))) if isinstance(x, float) else Fraction(x)
+    if _is_long(fraction):
         raise ValueError("too many digits")
-    return found
+    return fraction
 
 
 def _double(x: Fraction) -> float:
@@ -158,23 +158,23 @@ class ExactDesign:
 
     def fractions(self, parameter_set: ParameterSet) -> dict[str, Any] | None:
         """Parameter → fraction, an angle as a `Tilt`; None if a number or a tangent is not a fraction."""
-        found: dict[str, Any] = {}
+        fractions: dict[str, Any] = {}
         for name in parameter_set.names:
             number, tangent = self.tangents.get(name, self.values.get(name)), parameter_set[name].tangent
             if number is None or number.fraction is None or (tangent and number.fraction and name not in self.tangents):
                 return None
             value = rational(number.fraction)
-            found[name] = Tilt(value) if tangent else value
-        return found
+            fractions[name] = Tilt(value) if tangent else value
+        return fractions
 
     def coefficients(self, model: Model, parameter_set: ParameterSet) -> list[Any] | None:
-        """The coefficients as fractions; None if some are irrational."""
+        """The coefficients as fractions; None if one of them is irrational."""
         numbers = self.fractions(parameter_set)
-        found = [] if numbers is None else model.coefficients(numbers, parameter_set)
-        return found if found and all(isinstance(c, flint.fmpq) for c in found) else None
+        coefficients = [] if numbers is None else model.coefficients(numbers, parameter_set)
+        return coefficients if coefficients and all(isinstance(c, flint.fmpq) for c in coefficients) else None
 
     def matrices(self, model: Model, parameter_set: ParameterSet) -> list[list[list[Any]]] | None:
-        """The matrices of the model as fractions; None if it has none, or some entries are irrational."""
+        """The matrices of the model as fractions; None if the model has no matrices or an entry is irrational."""
         numbers = self.fractions(parameter_set)
         if numbers is None or model.pencil is None:
             return None
@@ -193,21 +193,21 @@ class ExactDesign:
 def as_exact_design(
     parameter_set: ParameterSet,
     parameters: Numbers,
-    stated: AnyNumbers | None = None,
+    exact_numbers: AnyNumbers | None = None,
     typed: Mapping[str, str] = MappingProxyType({}),
 ) -> ExactDesign:
-    """The exact design of doubles: each is the decimal that prints it, unless an exact number is given.
+    """The exact design for parameters in doubles. A double means its shortest decimal if no exact number is given.
 
     Args:
-        stated: parameter, or ``tan(parameter)`` of an angle → int, Fraction, fmpq, a float that stands for its decimal,
-            or text such as ``"-2/5"``, ``"1.02"``, ``"sqrt(2)/2"``, and for an angle ``"20 deg"``.
-        typed: parameter → such a text from the problem, as in `Problem.typed`.
+        exact_numbers: parameter, or ``tan(parameter)`` of an angle → its exact value: an int, a Fraction, an fmpq, a
+            float, which stands for its decimal, or a text such as ``"-2/5"``, ``"sqrt(2)/2"`` or ``"20 deg"``.
+        typed: parameter → its exact value as a text of the problem, as in `Problem.typed`.
 
     Raises:
         InputError: if a name is unknown, a value is not exact, or it differs from the double of the design.
     """
-    if wrong := table_faults("exact", {} if stated is None else stated, "{'zeta_B': '-1/3'}"):
-        raise InputError(wrong)
+    if table_errors := table_faults("exact", {} if exact_numbers is None else exact_numbers, "{'zeta_B': '-1/3'}"):
+        raise InputError(table_errors)
     names = {n: n for n in parameter_set.names} | {
         f"tan({p.name})": p.name for p in parameter_set.parameters if p.tangent
     }
@@ -215,15 +215,15 @@ def as_exact_design(
     values |= {n: number for n, text in typed.items() if (number := _parse(text, angle=parameter_set[n].unit == "rad"))}
     tangents: dict[str, Exact] = {}
     faults = []
-    for key, given in (stated or {}).items():
+    for key, entry in (exact_numbers or {}).items():
         name = names.get(key)
         angle = key == name and parameter_set[key].unit == "rad"
         if name is None:
             message = f"unknown parameter '{key}'; {suggest(key, names)}"
-        elif (number := _parse(given, angle)) is None:
-            found = "a number of more digits" if _is_long(given) else short(given)
+        elif (number := _parse(entry, angle)) is None:
+            description = "a number of more digits" if _is_long(entry) else short(entry)
             message = (
-                f"found {found}; accepted: an int, a Fraction, a constant in quotes such as '-2/5' or 'sqrt(2)'"
+                f"found {description}; accepted: an int, a Fraction, a constant in quotes such as '-2/5' or 'sqrt(2)'"
                 f"{', or an angle such as ' + repr('20 deg') if angle else ''}, of up to {MOST_DIGITS} digits"
             )
         else:
@@ -235,20 +235,20 @@ def as_exact_design(
         faults.append(Fault(message, ("exact", key)))
     if faults:
         raise InputError(faults)
-    others = Table({n: v for n, v in values.items() if n not in tangents})
-    return ExactDesign(others, Table(tangents), tuple(stated or ()))
+    other_values = Table({n: v for n, v in values.items() if n not in tangents})
+    return ExactDesign(other_values, Table(tangents), tuple(exact_numbers or ()))
 
 
-def _parse(given: Any, angle: bool) -> Exact | None:
-    if isinstance(given, bool):
+def _parse(value: Any, angle: bool) -> Exact | None:
+    if isinstance(value, bool):
         return None
     try:
-        if isinstance(given, str):
-            degrees = _DEGREES.fullmatch(given.strip()) if angle else None
-            return constant(degrees[1]).to_radians() if degrees else constant(given)
-        if isinstance(given, flint.fmpq | flint.fmpz):
-            fraction = rational(given) if isinstance(given, flint.fmpq) else flint.fmpq(given)
-            given = Fraction(int(fraction.p), int(fraction.q))
-        return Exact.from_fraction(decimal(given))
+        if isinstance(value, str):
+            degrees = _DEGREES.fullmatch(value.strip()) if angle else None
+            return constant(degrees[1]).to_radians() if degrees else constant(value)
+        if isinstance(value, flint.fmpq | flint.fmpz):
+            fraction = rational(value) if isinstance(value, flint.fmpq) else flint.fmpq(value)
+            value = Fraction(int(fraction.p), int(fraction.q))
+        return Exact.from_fraction(decimal(value))
     except (ValueError, TypeError, OverflowError):
         return None

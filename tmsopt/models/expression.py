@@ -25,19 +25,19 @@ from tmsopt.records import AnyNumbers
 
 COMPARISONS = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
 _BINARY = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.Pow: "pow"}
-_STRICT = {ast.Lt: "<=", ast.Gt: ">="}
+_STRICT_SIGNS = {ast.Lt: "<=", ast.Gt: ">="}
 
-_ALLOWED = {"<=": (-math.inf, 0.0), ">=": (0.0, math.inf), "==": (0.0, 0.0), "": (-math.inf, math.inf)}
-"""Accepted range of left minus right; callers rely on bounds that are 0 or infinite."""
+_ALLOWED_RANGES = {"<=": (-math.inf, 0.0), ">=": (0.0, math.inf), "==": (0.0, 0.0), "": (-math.inf, math.inf)}
+"""Comparison → allowed range of left minus right. Other modules assume that its ends are 0 or infinite."""
 
 SIGN = re.compile("|".join(COMPARISONS.values()))
 """Matches a comparison sign."""
 
-_LONGEST = 2000  # most characters; a longer text could exhaust the parser's stack
-_DEEPEST = 200  # most nested levels
-_LEGIBLE = 60  # most characters of a quoted part in a message
+_LONGEST = 2000  # most characters of an expression; a longer text could exhaust the stack of the parser
+_DEEPEST = 200  # most nested levels of an expression
+_MAX_QUOTED = 60  # most characters of a quoted part in a message
 _LANGUAGE = f"numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
-_NOT_ACCEPTED = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
+_BAD_CHARACTER = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
 
 
 class ExpressionError(ValueError):
@@ -84,7 +84,7 @@ class Expression:
     formula: Formula = field(default=Formula((), (), ()), repr=False, compare=False)
 
     def __call__(self, values: AnyNumbers) -> Any:
-        """The value for numbers of any kind; for a comparison, left minus right.
+        """The value for numbers of any kind; a comparison gives left minus right.
 
         Numbers in the text are exact fractions, and pi is π. A ball is nan where the value may not exist.
         """
@@ -96,7 +96,7 @@ class Expression:
         return tuple(float(x) if isinstance(x, np.float64) else x for x in kinds.values(self.formula, values))
 
     def difference(self, values: AnyNumbers, limit: Any) -> Any:
-        """Left minus right, with `limit` in place of the constant side."""
+        """Left minus right, where `limit` replaces a side that is a constant."""
         numbers = [self.formula.steps[k].op == CONSTANT for k in self.formula.outputs]
         left, right = (limit if is_number else x for x, is_number in zip(self.sides(values), numbers, strict=True))
         return left - right
@@ -120,7 +120,7 @@ class Expression:
     @property
     def allowed(self) -> tuple[float, float]:
         """Least and greatest left minus right that the comparison allows."""
-        return _ALLOWED[self.comparison]
+        return _ALLOWED_RANGES[self.comparison]
 
     @property
     def sign(self) -> float:
@@ -168,13 +168,13 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     return _check_names(_comparison(_text(text)), accepted)
 
 
-def _check_names(found: Expression, accepted: Iterable[str] | None) -> Expression:
-    """The expression, if all its names are accepted; the cached parser does not check them."""
-    known = found.names if accepted is None else tuple(accepted)
-    for name in found.names:
-        if name not in known:
-            raise UnknownName(found.text, name, known)
-    return found
+def _check_names(expression: Expression, accepted: Iterable[str] | None) -> Expression:
+    """Check the names of an expression and return it. The cached parser does not check them, because they differ."""
+    accepted_names = expression.names if accepted is None else tuple(accepted)
+    for name in expression.names:
+        if name not in accepted_names:
+            raise UnknownName(expression.text, name, accepted_names)
+    return expression
 
 
 @lru_cache(maxsize=4096)
@@ -190,14 +190,14 @@ def _comparison(text: str) -> Expression:
         raise ExpressionError(f"{_quote(text)} is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
     if len(body.ops) > 1:
         texts = pairwise(_source(side, text) for side in (body.left, *body.comparators))
-        signs = ({**COMPARISONS, **_STRICT}.get(type(op), "==") for op in body.ops)
-        each = " and ".join(f"'{a} {sign} {b}'" for (a, b), sign in zip(texts, signs, strict=True))
-        raise ExpressionError(f"{_quote(text)} joins several comparisons; write one constraint for each, {each}")
+        signs = ({**COMPARISONS, **_STRICT_SIGNS}.get(type(op), "==") for op in body.ops)
+        parts = " and ".join(f"'{a} {sign} {b}'" for (a, b), sign in zip(texts, signs, strict=True))
+        raise ExpressionError(f"{_quote(text)} joins several comparisons; write one constraint for each, {parts}")
     sign = COMPARISONS.get(type(body.ops[0]))
     if sign is None:
         raise ExpressionError(f"{_quote(text)} compares with a sign other than <=, >= and =={_advice(text)}")
     sides = [_parse_tree(side, text) for side in (body.left, *body.comparators)]
-    names = tuple(dict.fromkeys(name for found, _ in sides for name in found))
+    names = tuple(dict.fromkeys(name for side_names, _ in sides for name in side_names))
     if not names:
         raise ExpressionError(f"{_quote(text)} uses no parameter or quantity, so nothing can satisfy or violate it")
     return Expression(text, names, sign, formula([side for _, side in sides], names))
@@ -214,23 +214,23 @@ def written_sides(text: str) -> tuple[str, str, str]:
     return _source(body.left, text), sign, _source(body.comparators[0], text)
 
 
-def _text(given: object) -> str:
-    if not isinstance(given, str):
-        raise ExpressionError(f"found {short(given)}; accepted: an expression in quotes")
-    return given
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise ExpressionError(f"found {short(value)}; accepted: an expression in quotes")
+    return value
 
 
-_ONE_AT_A_TIME = threading.Lock()
-"""ast.parse (python/cpython#106905) and warnings.catch_warnings may not run in two threads at once."""
+_PARSER_LOCK = threading.Lock()
+"""Two threads may not run ast.parse (python/cpython#106905) or warnings.catch_warnings at the same time."""
 
 
 @lru_cache(maxsize=4096)
 def _parse(text: str) -> ast.expr:
     if len(text) > _LONGEST:
         raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")
-    if strange := _NOT_ACCEPTED.search(text.strip()):
-        found = f"{_quote(text)} contains {strange[0]!r}{_advice(text)}"
-        raise ExpressionError(f"{found}; accepted: one line of {_LANGUAGE}")
+    if bad_character := _BAD_CHARACTER.search(text.strip()):
+        message = f"{_quote(text)} contains {bad_character[0]!r}{_advice(text)}"
+        raise ExpressionError(f"{message}; accepted: one line of {_LANGUAGE}")
     try:
         return _tree(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -239,12 +239,12 @@ def _parse(text: str) -> ast.expr:
         hint = f"; '{reserved}' is a reserved word, write e.g. {reserved}_" if reserved else ""
         if reserved == "lambda":
             hint += f" (the tilt of a bicycle is lambda_s; if you mean the eigenvalue: {UNSUPPORTED})"
-        found = f"does not parse{column}{hint}{_advice(text)}; accepted: {_LANGUAGE}"
-        raise ExpressionError(f"{_quote(text)} {found}") from None
+        message = f"does not parse{column}{hint}{_advice(text)}; accepted: {_LANGUAGE}"
+        raise ExpressionError(f"{_quote(text)} {message}") from None
 
 
 def _tree(text: str) -> ast.expr:
-    with _ONE_AT_A_TIME, warnings.catch_warnings():
+    with _PARSER_LOCK, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which then fail
         return ast.parse(text.strip(), mode="eval").body
 
@@ -273,7 +273,7 @@ def _combine(op: str, *parts: _Part) -> _Part:
 
 
 def _parse_tree(body: ast.expr, text: str) -> tuple[tuple[str, ...], Node]:
-    """The names in a value, and its node; raises if it is not accepted arithmetic or its degree is too high."""
+    """The names and the node of an expression; raises `ExpressionError` if a part is not accepted or too large."""
     parser = _Parser(text)
     try:
         node = parser.parse(body).node
@@ -285,7 +285,7 @@ def _parse_tree(body: ast.expr, text: str) -> tuple[tuple[str, ...], Node]:
 
 
 def _quote(text: str) -> str:
-    return f"'{text}'" if len(text) <= _LEGIBLE else f"'{text[: _LEGIBLE - 1]}…'"
+    return f"'{text}'" if len(text) <= _MAX_QUOTED else f"'{text[: _MAX_QUOTED - 1]}…'"
 
 
 @dataclass
@@ -296,7 +296,7 @@ class _Parser:
     names: dict[str, Node] = field(default_factory=dict)
 
     def parse(self, node: ast.expr, depth: int = 0) -> _Part:  # noqa: PLR0911, PLR0912 - one case per kind
-        """The node of a part; raises unless it is accepted arithmetic."""
+        """The node of a part; raises `ExpressionError` if the part is not accepted."""
         text = self.text
         if depth > _DEEPEST:
             raise ExpressionError(f"'{text[:60]}…' is nested deeper than {_DEEPEST} levels")
@@ -321,24 +321,27 @@ class _Parser:
                     raise ExpressionError(f"{_quote(text)} uses an operator other than + - * / **{_advice(text)}")
                 return self.apply(_BINARY[type(op)], node, [left, right], depth)
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
-                fewest, most = (2, 99) if name in ("min", "max") else (1, 1)
-                if not fewest <= len(args) <= most:
-                    wanted = f"{fewest} to {most} arguments, {name}(a, b)" if most > 1 else "one argument"
-                    wanted += f"; for one number write {_source(args[0], text)} alone" if 0 < len(args) < fewest else ""
-                    raise ExpressionError(f"{_quote(text)} calls {name} with {len(args)} arguments; accepted: {wanted}")
+                min_count, max_count = (2, 99) if name in ("min", "max") else (1, 1)
+                if not min_count <= len(args) <= max_count:
+                    accepted = (
+                        f"{min_count} to {max_count} arguments, {name}(a, b)" if max_count > 1 else "one argument"
+                    )
+                    hint = f"; for one number write {_source(args[0], text)} alone" if 0 < len(args) < min_count else ""
+                    message = f"calls {name} with {len(args)} arguments; accepted: {accepted}{hint}"
+                    raise ExpressionError(f"{_quote(text)} {message}")
                 return self.apply(name, node, args, depth)
             case ast.Call():
-                advised = call_advice(called := _source(node.func, text), [_source(a, text) for a in node.args])
-                raise ExpressionError(f"{_quote(text)} calls '{called}'{advised}; accepted: {' '.join(FUNCTIONS)}")
+                hint = call_advice(function := _source(node.func, text), [_source(a, text) for a in node.args])
+                raise ExpressionError(f"{_quote(text)} calls '{function}'{hint}; accepted: {' '.join(FUNCTIONS)}")
             case ast.Attribute():
-                found = f"uses the attribute '{_source(node, text)}'; accepted: plain names"
-                raise ExpressionError(f"{_quote(text)} {found}")
+                message = f"uses the attribute '{_source(node, text)}'; accepted: plain names"
+                raise ExpressionError(f"{_quote(text)} {message}")
             case _:
-                found = f"contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}"
-                raise ExpressionError(f"{_quote(text)} {found}")
+                message = f"contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}"
+                raise ExpressionError(f"{_quote(text)} {message}")
 
     def apply(self, op: str, whole: ast.expr, operands: Sequence[ast.expr], depth: int) -> _Part:
-        """An operation on parts; more than two are combined one after the other."""
+        """Apply an operation to its operands; more than two operands are combined one after the other."""
         parts = [self.parse(operand, depth + 1) for operand in operands]
         try:
             return reduce(partial(_combine, op), parts[1:], parts[0]) if parts[1:] else _combine(op, *parts)
@@ -353,12 +356,12 @@ def _source(node: ast.expr, text: str) -> str:
 
 
 def _read_number(node: ast.Constant, text: str) -> Fraction:
-    """The exact number of a literal. Zero may have any exponent, so 10 to that power is not computed."""
+    """The exact value of a number in the text. 0e999999 is 0: the power of ten is not computed."""
     value, source = node.value, _source(node, text)
     try:
         number = float(value)  # type: ignore[arg-type]
     except OverflowError:
         number = math.inf
     if not math.isfinite(number) or (number == 0 and re.match(r"[0._]*[1-9]", source)):
-        raise ExpressionError(f"{_quote(text)} contains {source[:_LEGIBLE]}, a number beyond double precision")
+        raise ExpressionError(f"{_quote(text)} contains {source[:_MAX_QUOTED]}, a number beyond double precision")
     return Fraction(value) if isinstance(value, int) else Fraction(source.replace("_", "")) if number else Fraction(0)

@@ -15,11 +15,11 @@ from tmsopt.roots.exact import isolated_roots
 INERTIAS = {"I_Bxx": "m_B", "I_Bzz": "m_B", "I_Hxx": "m_H", "I_Hzz": "m_H"}
 """Moment of inertia about the centre of mass of its body → mass of that body."""
 
-_BITS = 400  # precision of tan λ_s and its secant, the only irrational numbers here
+_BITS = 400  # precision of tan λ_s and 1/cos λ_s, the only irrational numbers in this computation
 
 
 def inertia_margin(parameters: Numbers) -> Table[float | None] | None:
-    """The least value in kg m² of each moment of inertia, the others 0, at which a design is no longer stable.
+    """For each moment of inertia, the least value in kg m² at which, with the others 0, a design is no longer stable.
 
     Whipple's equations without wheels, trail and inertia are those of two masses on skates. Their coefficients are
     polynomials in one moment of inertia. Stability is lost at the least positive root of a0 aₙ Δₙ₋₁, with Δ the Hurwitz
@@ -27,10 +27,10 @@ def inertia_margin(parameters: Numbers) -> Table[float | None] | None:
     doubles.
 
     Args:
-        parameters: of two masses on skates, in SI, gains of a controller included.
+        parameters: parameters of the model ``tms`` in SI, with the gains of a controller if it has one.
 
     Returns:
-        A table with None for a moment of inertia that never ends stability; None if the design itself is not stable.
+        Name → value, or None if the design stays stable for every value; None instead of a table if it is not stable.
 
     Example:
         >>> own = dict(w=1, v=6.9, g=9.81, lambda_s=0.4, m_B=10, x_B=1.4, z_B=-0.4, m_H=1, x_H=1, z_H=-0.2)
@@ -42,8 +42,8 @@ def inertia_margin(parameters: Numbers) -> Table[float | None] | None:
     model = controlled(whipple, parameters)
     si = model.sets[0]
     with flint.ctx.workprec(_BITS):
-        given = {p.name: flint.arb(float(parameters.get(p.name, p.default or 0.0))) for p in si.parameters}
-        points = {name: rational(x) for name, x in model.algebraic(si.native(given)).items()}
+        si_values = {p.name: flint.arb(float(parameters.get(p.name, p.default or 0.0))) for p in si.parameters}
+        points = {name: rational(x) for name, x in model.algebraic(si.native(si_values)).items()}
         coefficients = model.polynomial(**points)
         sign = 1 if coefficients[0] > 0 else -1
         if not all(x > 0 for x in [sign * coefficients[0], *lienard_chipart([sign * c for c in coefficients])]):
@@ -55,8 +55,8 @@ def inertia_margin(parameters: Numbers) -> Table[float | None] | None:
 def _least_root(coefficients: Sequence[Any]) -> float | None:
     """The least positive root of a0 aₙ Δₙ₋₁, with coefficients that are numbers or polynomials in one unknown."""
     *_, minor, _ = hurwitz_minors(coefficients)
-    found = []
+    roots = []
     for boundary in (coefficients[0], coefficients[-1], minor):
         terms = list(flint.fmpq_poly([0]) + boundary)[::-1]
-        found += [z.real for z, _ in isolated_roots(terms) if z.imag == 0 and z.real > 0]
-    return min((float(z.mid()) for z in found), default=None)
+        roots += [z.real for z, _ in isolated_roots(terms) if z.imag == 0 and z.real > 0]
+    return min((float(z.mid()) for z in roots), default=None)

@@ -17,10 +17,10 @@ from tmsopt.algebra.formula import Formula, fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS, kind_of
 from tmsopt.records import AnyNumbers, Numbers, Table
 
-_BITS = 106  # precision of balls, whose radii then come from the roundings of the parameters alone
+_BALL_BITS = 106  # precision of intervals, so high that only the rounding of the parameters gives them a width
 _EPSILON = 2.0**-53
-_NEGLIGIBLE = 1e-9  # of a range: a smaller parameter counts as 0
-_PAGE = 3000  # most characters of a formula in LaTeX
+_NEGLIGIBLE = 1e-9  # a parameter below this share of its range counts as 0
+_MAX_LATEX = 3000  # a longer formula in LaTeX (in characters) is not shown
 
 NumberFunction = Callable[[AnyNumbers], Any]
 """Function of named numbers that uses ``+ - * /`` and the operations of `tmsopt.algebra.kinds`, so it can be traced."""
@@ -37,13 +37,13 @@ ROOTS = ("abscissa", "damping_ratio", "angular_frequency")
 
 @dataclass(frozen=True)
 class Feedback:
-    """Torques of a controller on M q″ + D q′ + K q, q = (lean, steer), in native units.
+    """The torques of a controller, added to M q″ + D q′ + K q = 0 with q = (lean, steer), in native units.
 
     Attributes:
-        mass: M.
+        mass: the matrix M.
         gains: G of the torques −G (φ, δ, φ̇, δ̇), rows for lean and steer.
         lag: time constant of the actuators; None for torques without delay. With a lag the torque of each row in
-            `driven` is a further state.
+            `driven` is an additional state.
         driven: rows with a torque: 0 for lean, 1 for steer.
     """
 
@@ -90,10 +90,10 @@ class Parameter:
         latex: symbol for figures.
         range: physically possible values.
         default: value if the parameter is omitted; None if it is required.
-        tangent: whether the coefficients are polynomials in its tangent, which an optimiser then varies instead.
-        multiple_of: unit of the scale of a dimensionless parameter, e.g. ``m`` for multiples of the wheelbase.
+        tangent: for an angle, whether the coefficients are polynomials in its tangent; an optimiser varies the tangent.
+        multiple_of: for a dimensionless multiple, such as of the wheelbase, the unit of what is multiplied: ``m``.
         sides: names of the designs with a negative and a positive value, if these are searched separately.
-        counterpart: the dimensionless parameter of one in SI, if its name differs.
+        counterpart: for a parameter in SI, the name of its dimensionless parameter, if that name differs.
 
     Example:
         >>> tilt = tmsopt.models.tms.sets[0]["lambda_s"]
@@ -115,7 +115,7 @@ class Parameter:
     counterpart: str = ""
 
     def may_change(self, value: float) -> bool:
-        """True if a builder may miss the value: not for constants of nature and parts that a design does not have."""
+        """True if the built value may differ: not for constants of nature and for parts that a design does not have."""
         return self.default is None or (self.default == 0 and value != 0)
 
 
@@ -127,10 +127,10 @@ class Quantity:
         value: function of parameters and other quantities; nan where the quantity does not exist.
         equation: function of the values and a number x, without division or radical, that is 0 exactly when x is the
             quantity, within `range`. An optimiser then has x as a variable.
-        pieces: terms whose maximum is the quantity. An optimiser then has a variable above all of them, if more of the
-            quantity is never an advantage.
-        counterpart: the SI quantity of a dimensionless one.
-        aside: whether reports have it in a sentence instead of their table.
+        pieces: terms whose maximum is the quantity. An optimiser replaces the quantity by a variable that is greater
+            than every term, if a greater quantity is never an advantage.
+        counterpart: for a dimensionless quantity, the same quantity in SI.
+        aside: whether reports state it in a sentence instead of in their table.
         share: whether it is a fraction of a whole, shown in percent.
         stands_for: the expression, in root quantities and parameters, that the name abbreviates.
 
@@ -196,7 +196,7 @@ class ParameterSet:
         rate: function from values of this set to a rate of 1 in 1/s; None if the set has no unit of time.
         root_unit: unit of the roots of the polynomial.
         torque: function from values of this set to a torque of 1 in N m; None if the set has no unit of torque.
-        needs: parameter → another that must be above 0 if the first is not 0, and the reason.
+        needs: parameter → (another parameter, which must be above 0 if the first is not 0; the reason).
 
     Example:
         >>> tmsopt.models.tms.parameter_set("SI").names
@@ -233,25 +233,25 @@ class Model:
 
     Attributes:
         sets: parameter sets; the first is the native one.
-        algebraic: native parameters → the numbers in which the coefficients are polynomials.
-        polynomial: algebraic parameters → coefficients, descending, by ``+ - *`` alone.
+        algebraic: native parameters → algebraic parameters, in which the coefficients are polynomials.
+        polynomial: algebraic parameters → coefficients, descending, computed with ``+ - *`` only.
         quantities: derived quantities, besides the coefficients ``a0 …``.
-        compact: like `polynomial`, but the coefficients divided by a positive number, with few operations and shared
-            terms: bounds by intervals and relaxations are tighter.
+        compact: like `polynomial`, but the coefficients are divided by a positive number and computed in few
+            operations with shared terms, which gives tighter bounds in interval arithmetic.
         pencil: native parameters → matrices of the matrix polynomial with these roots, in descending powers: M, D, K
             of M s² + D s + K, or I, −A.
         feedback: native parameters → the torques of a controller, which the pencil already includes.
         natural: whether coefficients and roots are near 1 in native units.
         origin: a function and its arguments, plain data, that make this model in another process.
         statement: plain data that identify a model of the user's own.
-        numbers: texts of the numbers in a model of the user's own that are not whole.
-        words: names of the field for a pair on the imaginary axis, ``weave`` in data, and a root 0, ``capsize``.
-        omits, conventions, sketch: text on what the model leaves out and on its signs, and a drawing in characters.
+        numbers: for a model of the user's own, the texts of its numbers that are not integers.
+        words: the usual names of ``weave`` (a pair on the imaginary axis) and ``capsize`` (a root 0) in its field.
+        omits, conventions, sketch: texts on the effects that the model neglects and on its signs; a text drawing.
         absent: unknown names that a user may try → what to write instead.
-        carrier: number added to each eigenfrequency of a complex H, so that no root of the polynomial, which has twice
-            the degree, meets the conjugate of another; None for a real system.
-        carried: ranges of the native parameters of a complex H → the model with a carrier for them.
-        double: pencil of a complex H without carrier: I and −A of (Re ψ, Im ψ)′ = A (Re ψ, Im ψ).
+        carrier: number added to each eigenfrequency of a complex H; None for a real system. Its real polynomial has
+            twice the degree; with the carrier no root of it coincides with the conjugate of another root.
+        carried: for a complex H, ranges of the native parameters → the model with a carrier for these ranges.
+        double: for a complex H, the pencil without carrier: I and −A of (Re ψ, Im ψ)′ = A (Re ψ, Im ψ).
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -301,33 +301,35 @@ class Model:
         """Native parameters and coefficients for numbers of any kind."""
         kind, native = kind_of(*parameters.values()), self.sets[0].names
         with np.errstate(all="ignore"):
-            found = fold(self.formulas[of.name], parameters, kind)
-        rounded = kind is BALLS and not {flint.arb, flint.arb_series}.isdisjoint(map(type, parameters.values()))
-        coefficients = found[len(native) :]
-        return dict(zip(native, found, strict=False)), [*map(as_ball, coefficients)] if rounded else coefficients
+            outputs = fold(self.formulas[of.name], parameters, kind)
+        coefficients = outputs[len(native) :]
+        if kind is BALLS and not {flint.arb, flint.arb_series}.isdisjoint(map(type, parameters.values())):
+            coefficients = [*map(as_ball, coefficients)]
+        return dict(zip(native, outputs, strict=False)), coefficients
 
     @cached_property
     def formulas(self) -> Mapping[str, Formula]:
         """Parameter set name → formula of the native parameters and coefficients."""
-        found = {}
-        for of in self.sets:
-            native = of.native({n: symbol(n) for n in of.names})
+        formulas = {}
+        for parameter_set in self.sets:
+            native = parameter_set.native({n: symbol(n) for n in parameter_set.names})
             coefficients = self.polynomial(**self.algebraic(native))
-            found[of.name] = formula([*(native[n] for n in self.sets[0].names), *coefficients], of.names)
-        return found
+            outputs = [*(native[n] for n in self.sets[0].names), *coefficients]
+            formulas[parameter_set.name] = formula(outputs, parameter_set.names)
+        return formulas
 
     def within(self, ranges: Mapping[str, tuple[float, float]]) -> "Model":
-        """The model for parameters within ranges: a complex H gets a carrier for them, other models stay the same."""
+        """The model for parameters in given ranges: a complex H gets a carrier for them, other models stay the same."""
         return self if self.carried is None else self.carried(ranges)
 
     def _repr_latex_(self) -> str | None:
         """The characteristic polynomial in the native parameters; None if it is too long."""
         from tmsopt.models.typeset import LATEX, Typeset, polynomial_text
 
-        of = self.sets[0]
-        found = fold(self.formulas[of.name], {p.name: Typeset(p.latex) for p in of.parameters}, LATEX)
-        text = polynomial_text(found[len(of.names) :])
-        return f"$${text} = 0$$" if len(text) <= _PAGE else None
+        native_set = self.sets[0]
+        outputs = fold(self.formulas[native_set.name], {p.name: Typeset(p.latex) for p in native_set.parameters}, LATEX)
+        text = polynomial_text(outputs[len(native_set.names) :])
+        return f"$${text} = 0$$" if len(text) <= _MAX_LATEX else None
 
     def coefficient_names(self) -> tuple[str, ...]:
         """``a0 … an``, or ``coefficient0 …`` if a parameter or quantity has one of these names."""
@@ -335,11 +337,10 @@ class Model:
 
     @cached_property
     def _coefficient_names(self) -> tuple[str, ...]:
-        taken = {q.name for of in self.sets for q in (*self.quantities, *of.quantities)} | {
-            n for of in self.sets for n in of.names
-        }
-        plain, long = ([f"{word}{k}" for k in range(self.degree + 1)] for word in ("a", "coefficient"))
-        return tuple(plain if taken.isdisjoint(plain) else long)
+        used_names = {q.name for s in self.sets for q in (*self.quantities, *s.quantities)}
+        used_names |= {n for s in self.sets for n in s.names}
+        short_names, long_names = ([f"{word}{k}" for k in range(self.degree + 1)] for word in ("a", "coefficient"))
+        return tuple(short_names if used_names.isdisjoint(short_names) else long_names)
 
     def quantity_names(self, of: ParameterSet) -> tuple[str, ...]:
         """Names that an expression may use besides the parameters of a set and the quantities of the roots."""
@@ -353,7 +354,7 @@ class Model:
 
 
 def words_of(model: Model) -> Mapping[str, str]:
-    """``weave`` and ``capsize``, the words in data → the words of a model's field.
+    """``weave`` and ``capsize`` → the words for them in the field of a model.
 
     Example:
         >>> dict(tmsopt.models.words_of(tmsopt.models.from_coefficients([1, "c", "k"])))
@@ -365,7 +366,7 @@ def words_of(model: Model) -> Mapping[str, str]:
 
 
 def in_words_of(model: Model, text: str) -> str:
-    """A name such as ``infinity and weave`` in the words of a model's field.
+    """A text such as ``infinity and weave`` with the words of the field of a model.
 
     Example:
         >>> tmsopt.models.in_words_of(tmsopt.models.from_coefficients([1, "c", "k"]), "infinity and weave")
@@ -373,7 +374,7 @@ def in_words_of(model: Model, text: str) -> str:
 
     More: docs/tutorials/own_system.md
     """
-    return re.sub("weave|capsize", lambda found: words_of(model)[found[0]], text)
+    return re.sub("weave|capsize", lambda match: words_of(model)[match[0]], text)
 
 
 class Values(Mapping[str, Any]):
@@ -407,7 +408,7 @@ class Values(Mapping[str, Any]):
         self.model, self.kind = model, kind_of(*parameters.values())
         self.given, self._ranges = (model, of, dict(parameters)), dict(ranges or {})
         self._known = {**native, **dict(zip(model.coefficient_names(), self.coefficients, strict=True)), **parameters}
-        self._found: dict[str, Any] = {}
+        self._computed: dict[str, Any] = {}
         self._formulas = {q.name: q for q in (*model.quantities, *of.quantities)}
         self._procedures = {q.name: q for q in extra}
         self._lift = lift
@@ -415,35 +416,37 @@ class Values(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name in self._known:
             return self._known[name]
-        if name not in self._found:
+        if name not in self._computed:
             quantity = self._procedures.get(name) or self._formulas[name]
             value = self._lift(quantity, self) if self._lift else None
             if value is None:
                 value = quantity.value(self) if name in self._procedures else self.fold(quantity.formula)[0]
-            self._found[name] = value
-        return self._found[name]
+            self._computed[name] = value
+        return self._computed[name]
 
-    def fold(self, formula: Formula, own: AnyNumbers = MappingProxyType({})) -> list[Any]:
-        """Outputs of a formula in these values and those of `own`; unknown quantities of the roots are nan."""
+    def fold(self, formula: Formula, given_values: AnyNumbers = MappingProxyType({})) -> list[Any]:
+        """Outputs of a formula; `given_values` take precedence over these values. Unknown root quantities are nan."""
         unknown = dict.fromkeys(ROOTS, np.nan)
-        known = {n: own[n] if n in own else self[n] if n in self else unknown[n] for n in formula.inputs}
+        inputs = {
+            n: given_values[n] if n in given_values else self[n] if n in self else unknown[n] for n in formula.inputs
+        }
         with np.errstate(all="ignore"):
-            return fold(formula, known, self.kind)
+            return fold(formula, inputs, self.kind)
 
     def roundings(self) -> list[float]:
-        """Error bound of each coefficient of a numeric design, from the rounding of its parameters to doubles."""
-        (model, of, parameters), ranges = self.given, self._ranges
+        """For each coefficient of a numeric design, the greatest error from rounding the parameters to doubles."""
+        (model, parameter_set, parameters), ranges = self.given, self._ranges
         sizes = {n: abs(float(x)) for n, x in parameters.items()}
         sizes |= {n: width for n, width in ranges.items() if sizes[n] <= _NEGLIGIBLE * width}
-        with flint.ctx.workprec(_BITS):
+        with flint.ctx.workprec(_BALL_BITS):
             balls = {n: flint.arb(float(x), sizes[n] * _EPSILON) for n, x in parameters.items()}
-            return [float(c.rad()) if c.is_finite() else np.inf for c in model.coefficients(balls, of)]
+            return [float(c.rad()) if c.is_finite() else np.inf for c in model.coefficients(balls, parameter_set)]
 
-    def with_known(self, known: AnyNumbers) -> "Values":
-        """Values of the same design, with given numbers in place of some formulas."""
-        other = copy(self)
-        other._known, other._found = {**self._known, **known}, {}
-        return other
+    def with_known(self, numbers: AnyNumbers) -> "Values":
+        """Values of the same design in which some quantities have given numbers instead of their formulas."""
+        result = copy(self)
+        result._known, result._computed = {**self._known, **numbers}, {}
+        return result
 
     def __iter__(self) -> Iterator[str]:
         return iter(dict.fromkeys((*self._known, *self._formulas, *self._procedures)))

@@ -15,12 +15,12 @@ CONSTANTS = ("pi",)
 """Names with a fixed value in every expression."""
 
 TAKEN = ("abscissa", "damping_ratio", "angular_frequency", "radius", "structure", "objective", *CONSTANTS, *FUNCTIONS)
-"""Names with a meaning of their own in expressions; no parameter may have one."""
+"""Names that already have a meaning in expressions, so that no parameter may have them."""
 
 _WORDS = read_table("advice")
 UNSUPPORTED: str = _WORDS["outside"]
-AMBIGUOUS_NAMES = {name: meant.format(outside=UNSUPPORTED) for name, meant in _WORDS["names"].items()}
-"""Names that may be meant as more than a parameter → what to write then."""
+AMBIGUOUS_NAMES = {name: template.format(outside=UNSUPPORTED) for name, template in _WORDS["names"].items()}
+"""Names that may have another meaning than a parameter → what to write in that case."""
 
 _EIGENVALUE = f"is the eigenvalue, which no entry may use (its powers go in coefficients or M, D, K; {UNSUPPORTED})"
 
@@ -29,11 +29,11 @@ _GREEK = re.compile(
     "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|phi|chi|psi|omega"
     "|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega"
 )
-_LONG = 80  # characters; a longer part gets a number and is written once
+_MAX_INLINE = 80  # most characters of a repeated part; a longer part gets a number and is written once
 
 
 def name_fault(name: Any, of_H: bool = False) -> str:
-    """Why no parameter or quantity may have a name; empty if it may. With a complex H, which has ω, s is free."""
+    """The reason why a parameter or quantity may not have a name; empty if it may. With a complex H it may be ``s``."""
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         return "is no name: a letter, then letters, digits and _"
     if keyword.iskeyword(name):
@@ -90,14 +90,14 @@ _SPELLINGS: Mapping[str, Callable[..., str]] = {
 
 
 def spell_formula(formula: Formula) -> tuple[list[str], list[str]]:
-    """The outputs of a formula as texts, with every digit of its doubles, and the parts that they share.
+    """The outputs of a formula as texts with every digit of its doubles, and the long parts, written once.
 
-    Equal texts mean equal formulas.
+    Formulas with equal texts are equal.
     """
     shared: list[str] = []
 
     def part(text: str) -> str:
-        if len(text) <= _LONG:
+        if len(text) <= _MAX_INLINE:
             return text
         shared.append(text)
         return f"[{len(shared)}]"

@@ -7,14 +7,14 @@ from typing import NamedTuple
 from tmsopt.algebra.formula import Constant, Formula, Kind, fold
 from tmsopt.algebra.kinds import FLOATS
 
-_SUM, _PRODUCT, _POWER, _ALONE = range(4)
+_SUM, _PRODUCT, _POWER, _ATOM = range(4)
 
 
 class Typeset(NamedTuple):
-    """LaTeX of a part of a formula, and its precedence: lowest for a sum, highest for a symbol."""
+    """LaTeX of a part of a formula, and its precedence: lowest for a sum, highest for a single symbol."""
 
     text: str
-    precedence: int = _ALONE
+    precedence: int = _ATOM
 
     def enclose(self, least: int) -> str:
         """The LaTeX, in parentheses if its precedence is below `least`."""
@@ -31,7 +31,7 @@ def _product(a: Typeset, b: Typeset) -> Typeset:
 
 
 def _power(a: Typeset, b: Typeset) -> Typeset:
-    return Typeset(f"{a.enclose(_ALONE)}^{{{b.text}}}", _POWER)
+    return Typeset(f"{a.enclose(_ATOM)}^{{{b.text}}}", _POWER)
 
 
 def _function(name: str) -> Callable[..., Typeset]:
@@ -52,11 +52,11 @@ def _number(x: Constant) -> Typeset:
         typeset: Typeset = fold(x, {}, LATEX)[0]
         return typeset
     if isinstance(x, Fraction) and Fraction(repr(float(x))) != x:
-        sign, whole = "-" * (x < 0), abs(x)
-        return Typeset(rf"{sign}\frac{{{whole.numerator}}}{{{whole.denominator}}}", _SUM if sign else _POWER)
+        sign, size = "-" * (x < 0), abs(x)
+        return Typeset(rf"{sign}\frac{{{size.numerator}}}{{{size.denominator}}}", _SUM if sign else _POWER)
     text, _, power = repr(float(x)).removesuffix(".0").partition("e")
     scale = rf" \cdot 10^{{{int(power)}}}" if power else ""
-    return Typeset(text + scale, _SUM if text.startswith("-") else _PRODUCT if scale else _ALONE)
+    return Typeset(text + scale, _SUM if text.startswith("-") else _PRODUCT if scale else _ATOM)
 
 
 LATEX = Kind(
@@ -78,7 +78,7 @@ LATEX = Kind(
         "equal": _relation("="),
         "both": _relation(r"\wedge"),
         "either": _relation(r"\vee"),
-        "not": lambda a: Typeset(rf"\neg {a.enclose(_ALONE)}", _POWER),
+        "not": lambda a: Typeset(rf"\neg {a.enclose(_ATOM)}", _POWER),
         "choose": _cases,
         "positive_part": lambda a: Typeset(rf"\max\left(0, {a.text}\right)", _POWER),
         "negligible": lambda a, size: Typeset(rf"{a.text} \approx 0", _SUM),
@@ -86,7 +86,7 @@ LATEX = Kind(
     },
     _number,
 )
-"""Fold a formula in this kind with a `Typeset` for each name."""
+"""Kind of numbers that are LaTeX: `fold` a formula in it, with a `Typeset` for each name."""
 
 
 def polynomial_text(coefficients: list[Typeset], variable: str = "s") -> str:

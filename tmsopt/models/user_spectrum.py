@@ -22,9 +22,9 @@ from tmsopt.roots.patterns.composed import pattern_names
 from tmsopt.roots.patterns.descriptions import describe_structure
 
 ON_AXIS = 1e-12
-"""Relative to the largest root: a smaller real part counts as 0, because of rounding."""
+"""A real part below this share of the largest root counts as 0, because it may come from rounding."""
 
-_ROUNDING = 1e-14  # of the largest root: a few roundings
+_ROUNDING = 1e-14  # a few rounding errors, as a share of the largest root
 
 
 def pattern_of(model: Model, name: str) -> Pattern:
@@ -37,7 +37,7 @@ def pattern_of(model: Model, name: str) -> Pattern:
 
 
 def patterns_of(model: Model) -> tuple[str, ...]:
-    """Names of the patterns of a model that do not combine others."""
+    """Names of the patterns of a model that are not combinations of other patterns."""
     return pattern_names(model.degree) if model.carrier is None else complex_pattern_names(model.degree // 2)
 
 
@@ -77,9 +77,9 @@ def user_root_array(model: Model, roots: Any) -> Any:
     return np.take_along_axis(roots, order, axis=-1) + 1j * model.carrier
 
 
-def user_structure(model: Model, found: Structure) -> Structure:
+def user_structure(model: Model, structure: Structure) -> Structure:
     """The user's structure for a structure of the polynomial."""
-    return replace(found, name=user_structure_name(model, found.name), roots=user_roots(model, found.roots))
+    return replace(structure, name=user_structure_name(model, structure.name), roots=user_roots(model, structure.roots))
 
 
 def polynomial_structure(model: Model, name: str, roots: Sequence[Root]) -> Structure:
@@ -99,28 +99,28 @@ def describe_user_structure(model: Model, structure: str, gain: bool = False) ->
 
 def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """ω = i s for the user's roots; empty for a real system."""
-    each = () if model.carrier is None else remove_rounding(model, roots)
-    return tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in each)
+    clean_roots = () if model.carrier is None else remove_rounding(model, roots)
+    return tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in clean_roots)
 
 
 def remove_rounding(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
-    """The user's roots, with 0 for parts that only the rounding of the carrier makes nonzero."""
-    each = tuple(roots)
-    rounding = 0.0 if model.carrier is None else _ROUNDING * _size(model, each)
-    parts = ([x if abs(x) > rounding else 0.0 for x in (r.re, r.im)] for r in each)
-    return tuple(Root(re, im, r.multiplicity) for (re, im), r in zip(parts, each, strict=True))
+    """The user's roots, in which real and imaginary parts as small as the rounding error of the carrier are 0."""
+    all_roots = tuple(roots)
+    rounding = 0.0 if model.carrier is None else _ROUNDING * _size(model, all_roots)
+    parts = ([x if abs(x) > rounding else 0.0 for x in (r.re, r.im)] for r in all_roots)
+    return tuple(Root(re, im, r.multiplicity) for (re, im), r in zip(parts, all_roots, strict=True))
 
 
 def roots_on_axis(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """The user's roots on the imaginary axis, which are real eigenfrequencies of H."""
-    each = tuple(roots)
-    return tuple(r for r in each if abs(r.re) <= ON_AXIS * _size(model, each))
+    all_roots = tuple(roots)
+    return tuple(r for r in all_roots if abs(r.re) <= ON_AXIS * _size(model, all_roots))
 
 
 def beyond_axis(model: Model, located: Sequence[str], roots: Sequence[Root]) -> float | None:
-    """Distance of the rightmost root beyond the imaginary axis, if a located pattern puts roots on it; 0 if none is.
+    """Distance of the rightmost root to the right of the imaginary axis, 0 if no root is there.
 
-    None if no located pattern puts a root on the axis.
+    None if no located pattern has roots on the axis.
     """
     if not roots or all(pattern_of(model, name).rest is None for name in located):
         return None

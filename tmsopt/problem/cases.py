@@ -10,10 +10,10 @@ import numpy as np
 from tmsopt.records import AnyNumbers, Numbers, Table
 
 POINTS = 7
-"""Points of a band in the first search; more are added where the worst case lies between them."""
+"""Number of points of a band in the first search. If the worst case lies between two points, more are added."""
 
 LARGEST = 16
-"""Cases of the first search with tolerances; the worst-case check covers the other corners."""
+"""Greatest number of cases in the first search with tolerances; the worst-case check covers the other corners."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Band:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """The points, ends included."""
+        """The points of the first search, with both ends."""
         return tuple(np.linspace(self.min, self.max, self.points).tolist())
 
 
 Scenario = Band | tuple[float, ...]
-"""A band, or separate values."""
+"""A band, or a list of values."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class Case:
         at: parameter → value instead of the nominal one, from a scenario.
         offset: parameter → amount added, from a tolerance.
         direction: parameter → change per unit of the robustness radius, in units of its weight.
-        edge: the boundary of stability whose nearest point this case is, searched from `direction`; its change does not
-            scale with the radius.
+        edge: for the nearest point of a boundary of stability, the name of the boundary. The search for the point began
+            from `direction`, and its change is not multiplied by the radius.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -70,17 +70,17 @@ class Case:
 
     def applied(self, parameters: AnyNumbers, radius: Any = 0.0, weights: Numbers | None = None) -> dict[str, Any]:
         """The varied design, for numbers, arrays or CasADi expressions."""
-        varied = {**parameters, **self.at}
+        values = {**parameters, **self.at}
         for name, change in self.offset.items():
-            varied[name] = varied[name] + change
-        reach = 1.0 if self.edge else radius
+            values[name] = values[name] + change
+        distance = 1.0 if self.edge else radius
         for name, share in self.direction.items():
-            varied[name] = varied[name] + reach * share * weight_of(name, parameters[name], weights or {})
-        return varied
+            values[name] = values[name] + distance * share * weight_of(name, parameters[name], weights or {})
+        return values
 
 
 def weight_of(name: str, value: Any, weights: Numbers) -> Any:
-    """Weight of a parameter: the given one, else its size, or 1 if it is 0."""
+    """Weight of a parameter: the one in `weights`, or else its absolute value, or 1 if the value is 0."""
     if name in weights:
         return weights[name]
     if isinstance(value, float | int) and value == 0:
@@ -108,11 +108,11 @@ class Cover:
     boxes: int
 
 
-def parse_scenario(stated: Any) -> Any:
+def parse_scenario(scenario: Any) -> Any:
     """A scenario from a band, a mapping with its min, max and points, or a list of values."""
-    if isinstance(stated, Mapping) and {"min", "max"} <= set(stated) <= {"min", "max", "points"}:
-        return Band(**stated)
-    return tuple(stated) if isinstance(stated, list) else stated
+    if isinstance(scenario, Mapping) and {"min", "max"} <= set(scenario) <= {"min", "max", "points"}:
+        return Band(**scenario)
+    return tuple(scenario) if isinstance(scenario, list) else scenario
 
 
 def middle_of(scenario: Scenario) -> float:
@@ -124,7 +124,7 @@ def middle_of(scenario: Scenario) -> float:
 def first_cases(
     scenarios: Mapping[str, Scenario], tolerances: Numbers, directions: Sequence[str] = ()
 ) -> tuple[Case, ...]:
-    """Scenario points combined with corners of the tolerance box, and a step either way in each direction."""
+    """Every scenario point with corners of the tolerance box, and steps of both signs in each of `directions`."""
     points = itertools.product(*(points_of(s) for s in scenarios.values()))
     grid = [Table(dict(zip(scenarios, point, strict=True))) for point in points]
     corners = [

@@ -15,54 +15,55 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT_NAMES, ROOT_QUANTITIES
 
 WORSE_DIRECTION = {"abscissa": 1.0, "damping_ratio": -1.0, ANGULAR_FREQUENCY: 1.0}
-"""Direction in which a root quantity gets worse; the factors of the program bound it from that side only."""
+"""Root quantity → sign of a change for the worse. The nonlinear program bounds the quantity on that side only."""
 
 _LESS_STABLE = {"abscissa": 1.0, "damping_ratio": -1.0, RADIUS: -1.0}
-"""Direction in which a quantity means less stability."""
+"""Root quantity → sign of a change towards less stability."""
 
 STABLE = "every root left of the axis"
 """Name of a stability constraint that the problem itself does not state."""
 
-_STEADY = 0.01  # least decay of a clearly stable design, relative to the mean size of the roots
-_DESIGNS = 32  # random designs for the direction of a root quantity
-_DECADES = 3.0  # random values of a root quantity range over so many decades on either side of 1
-_STEP = 1e-3
+_LEAST_DECAY = 0.01  # least decay rate of a clearly stable design, relative to the mean size of the roots
+_DESIGN_COUNT = 32  # random designs at which an expression is tested for its dependence on a quantity
+_DECADES = 3.0  # random sizes of a root quantity lie up to this many powers of ten above and below 1
+_STEP = 1e-3  # relative change of the quantity in these tests
 
 
 def depends_on_case(problem: Posed, expression: Expression, cases: Sequence[Case]) -> bool:
     """Whether an expression depends on parameters that differ between cases, apart from its root quantities.
 
-    Root quantities are the worst over the cases, hence equal in all. An equality holds at the nominal design only,
-    since it cannot hold at two corners of a box.
+    A root quantity is the worst value over the cases, so it is the same in all of them. An equality is required at the
+    nominal design only, because it cannot hold at two corners of a box.
     """
-    varied = {name for case in cases for table in (case.at, case.offset) for name in table}
-    if not varied or expression.equality:
+    varied_names = {name for case in cases for table in (case.at, case.offset) for name in table}
+    if not varied_names or expression.equality:
         return False
-    return bool(varied & _find_dependencies(problem.model, problem.parameter_set.name, expression))
+    return bool(varied_names & _find_dependencies(problem.model, problem.parameter_set.name, expression))
 
 
 def needs_two_sided_bounds(problem: Posed) -> bool:
     """Whether one-sided bounds on root quantities would make the problem easier than it is.
 
-    The factors bound the abscissa and the angular frequency from above and the damping ratio from below. That is exact
-    if objective and constraints do not improve as these grow or the ratio falls.
+    The nonlinear program writes the polynomial as a product of factors. Their constraints bound the abscissa and the
+    angular frequency from above and the damping ratio from below. These bounds are exact if the objective and the
+    constraints do not improve as the first two grow or the damping ratio falls.
     """
     return any(rewards_change_of(problem, name, worse) for name, worse in WORSE_DIRECTION.items())
 
 
 def rewards_change_of(problem: Posed, name: str, worse: float = 1.0) -> bool:
     """Whether the objective or a constraint improves at some design as a quantity grows (falls if `worse` is −1)."""
-    asked = [(problem.sign, problem.objective), *((c.sign, c) for c in problem.conditions.values())]
-    return any(e is not None and _can_fall(problem, sign, e, name, worse) for sign, e in asked)
+    terms = [(problem.sign, problem.objective), *((c.sign, c) for c in problem.conditions.values())]
+    return any(e is not None and _can_fall(problem, sign, e, name, worse) for sign, e in terms)
 
 
-def stability_limit(problem: Posed, steady: float = _STEADY) -> dict[str, str]:
-    """Name → a constraint that keeps designs stable; empty if neither limits nor objective require stability.
+def stability_limit(problem: Posed, least_decay: float = _LEAST_DECAY) -> dict[str, str]:
+    """Name → a constraint that keeps designs stable; empty if neither the limits nor the objective require it.
 
-    It allows the edge of stability if the limits do and the objective does not depend on the roots.
+    It allows roots on the imaginary axis if the limits allow them and the objective does not depend on the roots.
 
     Args:
-        steady: least decay relative to the mean size of the roots.
+        least_decay: least decay rate relative to the mean size of the roots.
     """
     roots = {"abscissa", "damping_ratio", RADIUS}
     if problem.pattern or not any(name in roots and problem.asks(name) for name in roots):
@@ -73,40 +74,40 @@ def stability_limit(problem: Posed, steady: float = _STEADY) -> dict[str, str]:
 
     def is_excluded(abscissa: float, ratio: float) -> bool:
         """Whether a limit excludes roots with these values."""
-        found = {"abscissa": abscissa, "damping_ratio": ratio, RADIUS: 0.0, ANGULAR_FREQUENCY: size}
-        asked = (c for c in problem.conditions.values() if roots & set(c.names))
-        return any(not c.holds(float(c(values.with_known(found)))) for c in asked)
+        root_values = {"abscissa": abscissa, "damping_ratio": ratio, RADIUS: 0.0, ANGULAR_FREQUENCY: size}
+        limits = (c for c in problem.conditions.values() if roots & set(c.names))
+        return any(not c.holds(float(c(values.with_known(root_values)))) for c in limits)
 
-    goal = problem.objective is not None and bool(roots & set(problem.objective.names))
-    if not goal and not is_excluded(1e-6 * size, -1e-6):
+    objective_uses_roots = problem.objective is not None and bool(roots & set(problem.objective.names))
+    if not objective_uses_roots and not is_excluded(1e-6 * size, -1e-6):
         return {}
-    edge = not goal and not is_excluded(0.0, 0.0)
-    least = 0.0 if edge or not 0 < size < np.inf else steady * size
-    return {STABLE: f"abscissa <= {0.0 - least!r}"}
+    allows_edge = not objective_uses_roots and not is_excluded(0.0, 0.0)
+    decay = 0.0 if allows_edge or not 0 < size < np.inf else least_decay * size
+    return {STABLE: f"abscissa <= {0.0 - decay!r}"}
 
 
 def sense_notes(problem: Posed) -> tuple[str, ...]:
-    """A note if the objective improves only as stability gets worse."""
+    """A note for the reader if the objective improves only while stability gets worse."""
     sign, goal, text = problem.sign, problem.objective, problem.goal
-    named = {n: worse for n, worse in _LESS_STABLE.items() if problem.free and goal and n in goal.names}
+    directions = {n: worse for n, worse in _LESS_STABLE.items() if problem.free and goal and n in goal.names}
     if not goal or not any(
         _can_fall(problem, sign, goal, n, worse) and not _can_fall(problem, sign, goal, n, -worse)
-        for n, worse in named.items()
+        for n, worse in directions.items()
     ):
         return ()
-    other = f'{"maximize" if problem.maximize is None else "minimize"} = "{text}"'
-    return (f"{problem.sense} {text} asks for the least stable design; write {other} for the most stable one",)
+    opposite = f'{"maximize" if problem.maximize is None else "minimize"} = "{text}"'
+    return (f"{problem.sense} {text} asks for the least stable design; write {opposite} for the most stable one",)
 
 
 def demands_heavy_damping(problem: Posed) -> bool:
     """Whether a constraint on the damping ratio allows only 1: all roots real and negative."""
-    below, at = ({"damping_ratio": ratio} for ratio in (1 - 1e-9, 1.0))
-    asked = (c for c in problem.conditions.values() if c.names == ("damping_ratio",))
-    return any(c.holds(float(c(at))) and not c.holds(float(c(below))) for c in asked)
+    below_one, at_one = ({"damping_ratio": ratio} for ratio in (1 - 1e-9, 1.0))
+    limits = (c for c in problem.conditions.values() if c.names == ("damping_ratio",))
+    return any(c.holds(float(c(at_one))) and not c.holds(float(c(below_one))) for c in limits)
 
 
 def _can_fall(problem: Posed, sign: float, expression: Expression, name: str, worse: float) -> bool:
-    """Whether `sign` times an expression falls at some design as a quantity gets worse; an equality must not change."""
+    """Whether `sign` times an expression falls at some design as a quantity gets worse; for an equality, changes."""
     if name in ROOT_NAMES and name not in expression.names:
         return False
     if expression.text.strip() == name:  # the most common case
@@ -115,16 +116,17 @@ def _can_fall(problem: Posed, sign: float, expression: Expression, name: str, wo
         return expression.equality or sign * worse * side < 0
     rng = np.random.default_rng(0)
     ends = np.array([*problem.free.values()]).reshape(-1, 2)
-    for _ in range(_DESIGNS):
-        drawn = problem.ordered(dict(zip(problem.free, rng.uniform(*ends.T).tolist(), strict=True)))
-        found = {n: float(rng.choice((-1, 1)) * 10 ** rng.uniform(-_DECADES, _DECADES)) for n in ROOT_NAMES}
-        found |= {n: abs(found[n]) for n in (ANGULAR_FREQUENCY, RADIUS)} | {"damping_ratio": float(rng.uniform(-1, 1))}
-        value = found.setdefault(name, float(rng.uniform(0.1, 2.0)))
-        before, after = (
-            float(expression(problem.values(drawn).with_known(found | {name: x})))
+    for _ in range(_DESIGN_COUNT):
+        design = problem.ordered(dict(zip(problem.free, rng.uniform(*ends.T).tolist(), strict=True)))
+        root_values = {n: float(rng.choice((-1, 1)) * 10 ** rng.uniform(-_DECADES, _DECADES)) for n in ROOT_NAMES}
+        root_values |= {n: abs(root_values[n]) for n in (ANGULAR_FREQUENCY, RADIUS)}
+        root_values["damping_ratio"] = float(rng.uniform(-1, 1))
+        value = root_values.setdefault(name, float(rng.uniform(0.1, 2.0)))
+        old_value, new_value = (
+            float(expression(problem.values(design).with_known(root_values | {name: x})))
             for x in (value, value + worse * _STEP * min(1.0, abs(value)))
         )
-        change = sign * (after - before)
+        change = sign * (new_value - old_value)
         if change < 0 or (expression.equality and change != 0):
             return True
     return False
@@ -133,12 +135,13 @@ def _can_fall(problem: Posed, sign: float, expression: Expression, name: str, wo
 @lru_cache(maxsize=4096)
 def _find_dependencies(model: Model, set_name: str, expression: Expression) -> frozenset[str]:
     """Parameters that an expression depends on, directly or through quantities, but not through root quantities."""
-    of = model.parameter_set(set_name)
+    parameter_set = model.parameter_set(set_name)
     extra = (*ROOT_QUANTITIES, NO_RADIUS)
 
-    def stand_in(quantity: Quantity, values: Values) -> Any:
-        """A root quantity as a symbol of its own."""
+    def root_symbol(quantity: Quantity, values: Values) -> Any:
+        """A symbol for a root quantity; None for other quantities."""
         return symbol(quantity.name) if quantity.name in ROOT_NAMES else None
 
-    values = Values(model, of, {name: symbol(name) for name in of.names}, extra=extra, lift=stand_in)
-    return frozenset(formula([expression(values)]).inputs) & frozenset(of.names)
+    symbols = {name: symbol(name) for name in parameter_set.names}
+    values = Values(model, parameter_set, symbols, extra=extra, lift=root_symbol)
+    return frozenset(formula([expression(values)]).inputs) & frozenset(parameter_set.names)

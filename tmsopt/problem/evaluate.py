@@ -1,7 +1,7 @@
 """Evaluates expressions for many designs at once, in arrays of doubles.
 
-Each set of expressions becomes one formula, evaluated on the columns. Columns with error bounds (`Bounded`) give values
-with error bounds.
+Each set of expressions becomes one formula, which is evaluated on columns: an array of values for each parameter.
+Columns with error bounds (`Bounded`) give values with error bounds.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -46,13 +46,13 @@ class ArrayFunction:
         Returns:
             Name → value, in the shape of the columns that the expression depends on.
         """
-        missing = {n for n in self.formula.inputs if n not in columns}
-        known = roots_of(coefficients_of(self.problem, columns), missing) if missing else {}
-        return dict(zip(self.names, evaluate_on_arrays(self.formula, {**columns, **known}), strict=True))
+        missing_names = {n for n in self.formula.inputs if n not in columns}
+        root_values = roots_of(coefficients_of(self.problem, columns), missing_names) if missing_names else {}
+        return dict(zip(self.names, evaluate_on_arrays(self.formula, {**columns, **root_values}), strict=True))
 
 
 def evaluate(problem: Posed, expressions: Iterable[str | Expression], columns: AnyNumbers) -> list[Any]:
-    """Values of expressions in their order, by an `ArrayFunction` from a cache."""
+    """Values of expressions in the given order. The functions that compute them are cached."""
     return list(_cached_function(problem, tuple(expressions))(columns).values())
 
 
@@ -75,15 +75,15 @@ def _cached_function(problem: Posed, expressions: tuple[str | Expression, ...]) 
 
 
 def coefficients_of(problem: Posed, columns: AnyNumbers) -> list[Any]:
-    """Coefficients of designs, each in the shape of the columns that it depends on."""
+    """Coefficients of designs; each has the shape of the columns that it depends on."""
     return evaluate_on_arrays(coefficient_formula(problem.model, problem.parameter_set.name), columns)
 
 
 @lru_cache(maxsize=64)
 def coefficient_formula(model: Model, set_name: str) -> Formula:
     """The coefficients of a model as a formula in the parameters of a set."""
-    whole = model.formulas[set_name]
-    return whole.extract(whole.outputs[len(model.sets[0].names) :])
+    all_outputs = model.formulas[set_name]
+    return all_outputs.extract(all_outputs.outputs[len(model.sets[0].names) :])
 
 
 def roots_of(coefficients: Collection[Any], names: Collection[str] = ROOTS) -> dict[str, Any]:
@@ -91,19 +91,19 @@ def roots_of(coefficients: Collection[Any], names: Collection[str] = ROOTS) -> d
     if not set(ROOTS) & set(names):
         return {}
     a = np.stack(np.broadcast_arrays(*coefficients), axis=-1)
-    exist, a, found = np.isfinite(a).all(axis=-1), regularise(a), {}
+    is_finite, a, quantities = np.isfinite(a).all(axis=-1), regularise(a), {}
     if ANGULAR_FREQUENCY in names:
-        found[ANGULAR_FREQUENCY] = roots(a).imag.max(axis=-1)
+        quantities[ANGULAR_FREQUENCY] = roots(a).imag.max(axis=-1)
     if {"abscissa", "damping_ratio"} & set(names):
         motion = find_motion(list(np.moveaxis(a, -1, 0)))
-        found |= {"abscissa": motion.abscissa, "damping_ratio": motion.damping_ratio}
-    return {n: np.where(exist, x, np.nan) for n, x in found.items()}
+        quantities |= {"abscissa": motion.abscissa, "damping_ratio": motion.damping_ratio}
+    return {n: np.where(is_finite, x, np.nan) for n, x in quantities.items()}
 
 
 def nodes_of(problem: Posed, expressions: Mapping[str, str | Expression]) -> dict[str, Any]:
-    """Expressions as nodes in the parameters and root quantities; left minus right for comparisons."""
-    of = problem.parameter_set
-    values = Values(problem.model, of, {n: symbol(n) for n in of.names}, extra=(NO_RADIUS,))
+    """Expressions as nodes that depend on parameters and root quantities; a comparison gives left minus right."""
+    parameter_set = problem.parameter_set
+    values = Values(problem.model, parameter_set, {n: symbol(n) for n in parameter_set.names}, extra=(NO_RADIUS,))
     values = values.with_known({n: symbol(n) for n in ROOTS})
     return {n: e(values) for n, e in parse_all(problem, expressions).items()}
 
@@ -114,13 +114,13 @@ def parse_all(problem: Posed, expressions: Mapping[str, str | Expression]) -> di
     Raises:
         InputError: listing every text that is no expression of this problem.
     """
-    found: dict[str, Expression] = {}
+    parsed_expressions: dict[str, Expression] = {}
     faults = []
-    for name, given in expressions.items():
+    for name, expression in expressions.items():
         try:
-            found[name] = given if isinstance(given, Expression) else problem.read(given)
+            parsed_expressions[name] = expression if isinstance(expression, Expression) else problem.read(expression)
         except ExpressionError as error:
             faults.append(Fault(str(error), ("quantities", name)))
     if faults:
         raise InputError(faults)
-    return found
+    return parsed_expressions

@@ -1,4 +1,4 @@
-"""Reads problem files: TOML to a `Problem`, with every fault at its line."""
+"""Reads problem files: turns TOML into a `Problem`, and reports every fault with its line."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -107,32 +107,32 @@ def load(path: str | PathLike[str]) -> Problem:
     return _load_problem(path, lambda problem: [])
 
 
-def pose(given: object) -> Posed:
+def pose(source: object) -> Posed:
     """The posed problem of a problem, of a problem file, or of a solution.
 
     Raises:
         InputError: for a file with faults, or for anything else.
     """
-    return _pose(given, lambda problem: [])
+    return _pose(source, lambda problem: [])
 
 
-def as_solvable(given: object, front: bool = False) -> Posed:
+def as_solvable(source: object, front: bool = False) -> Posed:
     """The posed problem as for `pose`, which must ask for one design, or for a Pareto front if `front` is set.
 
     Raises:
         InputError: as for `pose`, and if parameters are free but there is no objective.
     """
-    return _pose(given, lambda problem: [] if front and problem.pareto else find_question_faults(problem))
+    return _pose(source, lambda problem: [] if front and problem.pareto else find_question_faults(problem))
 
 
-def _pose(given: object, faults_of: Callable[[Posed], list[Fault]]) -> Posed:
-    if isinstance(given, str | PathLike):
-        return _load_problem(given, faults_of).posed
-    stated = given.problem if isinstance(given, Solution) else given
-    if not isinstance(stated, Problem | Posed):
-        message = f"found {short(given)}; accepted: a Problem, the path of a problem file, or a Solution"
+def _pose(source: object, faults_of: Callable[[Posed], list[Fault]]) -> Posed:
+    if isinstance(source, str | PathLike):
+        return _load_problem(source, faults_of).posed
+    problem = source.problem if isinstance(source, Solution) else source
+    if not isinstance(problem, Problem | Posed):
+        message = f"found {short(source)}; accepted: a Problem, the path of a problem file, or a Solution"
         raise InputError([Fault(message, ("problem",))])
-    posed = stated if isinstance(stated, Posed) else stated.posed
+    posed = problem if isinstance(problem, Posed) else problem.posed
     if faults := faults_of(posed):
         raise InputError(faults)
     return posed
@@ -142,11 +142,11 @@ def _load_problem(path: str | PathLike[str], faults_of: Callable[[Posed], list[F
     page = read_page(path, "problem")
     if "parameters" not in page.data and {"problem", "study", "vary"} & set(page.data):
         written = page.data.get("problem")
-        own = f"its problem, {written}" if isinstance(written, str) else "a file with its [problem] alone"
-        message = f"is a study of many designs, not a problem; run tmsopt study {page.file}, or give {own}"
+        advice = f"its problem, {written}" if isinstance(written, str) else "a file with its [problem] alone"
+        message = f"is a study of many designs, not a problem; run tmsopt study {page.file}, or give {advice}"
         raise InputError([Fault(message, file=page.file)])
     faults, problem = problem_from_tables(_add_bicycle_parameters(page), escape_unprintable(Path(page.file).stem))
-    if problem is not None and not faults:  # a misspelt [objective] is no missing one
+    if problem is not None and not faults:  # a misspelt [objective] is not a missing objective
         faults = faults_of(problem.posed)
     if problem is None or faults:
         raise page.error(faults)
@@ -155,22 +155,23 @@ def _load_problem(path: str | PathLike[str], faults_of: Callable[[Posed], list[F
 
 def _add_bicycle_parameters(page: Page) -> Tables:
     """The tables with the parameters of their `bicycle` file; the file's own parameters take precedence."""
-    data, named, given = page.data, page.data.get("bicycle"), page.data.get("parameters", {})
-    if not isinstance(named, str) or not isinstance(given, dict):
+    data, bicycle_file, parameters = page.data, page.data.get("bicycle"), page.data.get("parameters", {})
+    if not isinstance(bicycle_file, str) or not isinstance(parameters, dict):
         return data
     try:
-        bicycle = read_bicycle(Path(page.file).parent / named)
+        bicycle = read_bicycle(Path(page.file).parent / bicycle_file)
     except InputError as error:
+        name = short(bicycle_file)
         raise page.error(
-            f if f.line else Fault(f"{short(named)} {f.message}; the name is relative to this file", ("bicycle",))
+            f if f.line else Fault(f"{name} {f.message}; the name is relative to this file", ("bicycle",))
             for f in error.faults
         ) from None
-    measured = {n: v for n, v in bicycle.parameters.items() if n not in data.get("scenarios", {})}
-    return {"model": "whipple", **data, "parameters": {**measured, **given}}
+    bicycle_parameters = {n: v for n, v in bicycle.parameters.items() if n not in data.get("scenarios", {})}
+    return {"model": "whipple", **data, "parameters": {**bicycle_parameters, **parameters}}
 
 
 def problem_from_tables(data: Tables, title: str) -> tuple[list[Fault], Problem | None]:
-    """The faults of a problem file's tables, and the problem.
+    """The faults of the tables of a problem file, and the problem; None if a fault prevents it.
 
     Args:
         title: used if the file has none.
@@ -192,44 +193,46 @@ def problem_from_tables(data: Tables, title: str) -> tuple[list[Fault], Problem 
         try:
             problem = Problem(model=model, constraints=parsed.constraints, title=title, **tables, **objective)
         except InputError as error:
-            reported = {f.key[:2] for f in faults} | {("parameters", *f.key[1:2]) for f in faults}
-            reported |= {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
-            faults += [f for f in error.faults if f.key[:2] not in reported]
-    typed = [replace(f, key=("feedback", *f.key[1:])) if {*f.key[1:2]} & gains else f for f in faults]
-    return gains_faults + typed, problem
+            reported_keys = {f.key[:2] for f in faults} | {("parameters", *f.key[1:2]) for f in faults}
+            reported_keys |= {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
+            faults += [f for f in error.faults if f.key[:2] not in reported_keys]
+    named_faults = [replace(f, key=("feedback", *f.key[1:])) if {*f.key[1:2]} & gains else f for f in faults]
+    return gains_faults + named_faults, problem
 
 
 def _split_gains(data: Tables) -> tuple[list[Fault], set[str], Tables]:
-    """Faults of [feedback], its valid names, and the tables with the gains among the parameters."""
+    """Faults of [feedback], its valid names, and the tables of the file with the gains moved to [parameters]."""
     gains, parameters, model = data.get("feedback", {}), data.get("parameters", {}), data.get("model", "tms")
     if not gains or not isinstance(gains, dict) or not isinstance(parameters, dict):
         return [], set(), data
-    others = {k: v for k, v in data.items() if k != "feedback"}
-    known = gain_names(model) if isinstance(model, str) else ()
-    if not known:
+    remaining_data = {k: v for k, v in data.items() if k != "feedback"}
+    accepted = gain_names(model) if isinstance(model, str) else ()
+    if not accepted:
         message = "is for the bicycles tms and whipple; write B, C and G in [model] for your own system"
-        misspelt = isinstance(model, str) and model not in MODELS  # reported elsewhere
-        return [] if misspelt else [Fault(message, ("feedback",))], set(), others
+        is_misspelt = isinstance(model, str) and model not in MODELS  # reported elsewhere
+        return [] if is_misspelt else [Fault(message, ("feedback",))], set(), remaining_data
     faults = []
     for name in gains:
-        if name not in known:
-            faults.append(Fault(f"unknown gain {short(name)}; {suggest(name, known)}", ("feedback", name)))
+        if name not in accepted:
+            faults.append(Fault(f"unknown gain {short(name)}; {suggest(name, accepted)}", ("feedback", name)))
         elif name in parameters:
             faults.append(Fault(f"'{name}' is in [parameters] too; keep one", ("feedback", name)))
-    own = {n: v for n, v in gains.items() if n in known}
-    return faults, set(own), {**others, "parameters": {**parameters, **own}} if own else others
+    valid_gains = {n: v for n, v in gains.items() if n in accepted}
+    if valid_gains:
+        remaining_data["parameters"] = {**parameters, **valid_gains}
+    return faults, set(valid_gains), remaining_data
 
 
-def _find_model(written: Any) -> tuple[list[Fault], Model | None]:
-    """The model with this name, or stated by this table, after the faults."""
-    if isinstance(written, dict):
-        return stated_model(written)
-    if not isinstance(written, str):
+def _find_model(entry: Any) -> tuple[list[Fault], Model | None]:
+    """The faults of the key ``model``, and the model that its name or table means."""
+    if isinstance(entry, dict):
+        return stated_model(entry)
+    if not isinstance(entry, str):
         return [], None  # reported with the shape of the file
-    if written in MODELS:
-        return [], MODELS[written]
-    unknown = f"unknown model {short(written)}; {suggest(written, MODELS)}; your own goes in a table [model]"
-    return [Fault(unknown, ("model",))], None
+    if entry in MODELS:
+        return [], MODELS[entry]
+    message = f"unknown model {short(entry)}; {suggest(entry, MODELS)}; your own goes in a table [model]"
+    return [Fault(message, ("model",))], None
 
 
 _ENTRIES: Mapping[str, tuple[type[Section], str]] = {
@@ -250,8 +253,8 @@ _ACCEPTED = {
 """Table or key → accepted values."""
 
 
-def _explain_shape(where: tuple[int | str, ...], kind: str, found: Any) -> Fault:
-    """A pydantic complaint in the words of the problem file."""
+def _explain_shape(where: tuple[int | str, ...], kind: str, value: Any) -> Fault:
+    """The fault for an error message of pydantic, in the words of the problem file."""
     tags = ("_FreeParameter", "_Band", "float", "int", "str", "dict[str,any]")
     key = tuple(str(k) for k in where if k not in tags)
     match key:
@@ -271,12 +274,12 @@ def _explain_shape(where: tuple[int | str, ...], kind: str, found: Any) -> Fault
     if inner or not is_table:
         accepted = _ACCEPTED.get("pareto" if inner[:1] == ["pareto"] else section, accepted)
     return Fault(
-        f"found {short(found)}; accepted: {accepted}", key[: 3 if section in ("parameters", "constraints") else 2]
+        f"found {short(value)}; accepted: {accepted}", key[: 3 if section in ("parameters", "constraints") else 2]
     )
 
 
 def _collect_tables(written: _File) -> dict[str, Any]:
-    """The tables of a problem, numbers as typed."""
+    """The tables of a problem, with numbers and texts as they were typed."""
     free = {n: v for n, v in written.parameters.items() if isinstance(v, _FreeParameter)}
     bands = {n: Band(**vars(s)) for n, s in written.scenarios.items() if isinstance(s, _Band)}
     return {

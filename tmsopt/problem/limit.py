@@ -27,28 +27,28 @@ def split_limit(text: str) -> WrittenLimit | None:
         ExpressionError: for a text that does not parse.
     """
     left, sign, right = written_sides(text)
-    for before, side, behind in (("", left, f" {sign} {right}"), (f"{left} {sign} ", right, "")):
+    for text_before, side, text_behind in (("", left, f" {sign} {right}"), (f"{left} {sign} ", right, "")):
         if _NUMBER.fullmatch(number := _remove_blanks(side)):
-            return WrittenLimit(before, float(number), behind)
+            return WrittenLimit(text_before, float(number), text_behind)
     return None
 
 
 def limit_value(text: str) -> float | None:
-    """The number on one side of a comparison; None without one."""
+    """The number on one side of a comparison; None if neither side is a number."""
     limit = split_limit(text)
     return None if limit is None else limit.value
 
 
 def limit_side(text: str, name: str) -> int:
-    """1 if a comparison has just the named quantity left and a number right, −1 if the reverse, else 0.
+    """1 for ``name <= number``, −1 for ``number <= name``, with any sign of comparison; 0 for any other comparison.
 
     Parentheses are ignored, as in ``(abscissa) <= -0.3``.
     """
     sides = [_remove_blanks(side).strip("()") for side in SIGN.split(text)]
     if len(sides) != 2 or name not in sides:
         return 0
-    left = sides[0] == name
-    return (1 if left else -1) if _NUMBER.fullmatch(sides[left]) else 0
+    is_left = sides[0] == name
+    return (1 if is_left else -1) if _NUMBER.fullmatch(sides[is_left]) else 0
 
 
 def replace_limit(text: str, value: float) -> str:

@@ -26,11 +26,11 @@ KEYS = {
 }
 """Key of the table → meaning."""
 
-_ALONE = {
+_EXCLUSIVE_KEYS = {
     "coefficients": "coefficients, or the matrices",
     "H": "H, a complex system, or the matrices of a real one",
 }
-"""Keys that must be the only ones to state a system."""
+"""Key that allows no other key of a system → the alternatives, for messages."""
 
 _DESCENDING = "accepted: expressions in brackets, by descending powers of s, such as ['1', 'c', 'k']"
 
@@ -43,15 +43,15 @@ _EXAMPLE = (
 def stated_model(table: Tables) -> tuple[list[Fault], Model | None]:
     """The faults of a [model] table, and its model.
 
-    An entry is a number or an expression. Each name in it is a parameter, or one of ``[model.quantities]``, which may
-    use one another.
+    An entry is a number or an expression. A name in an expression means a parameter, or a quantity of
+    ``[model.quantities]``. These quantities may use one another.
     """
     faults: list[Fault] = []
 
     def fault(message: str, *key: str) -> None:
         faults.append(Fault(message, ("model", *key)))
 
-    given = [key for key in (*_MATRICES, "coefficients") if key in table]
+    system_keys = [key for key in (*_MATRICES, "coefficients") if key in table]
     advice = limit_advice(suggest)
     for key in table:
         if key not in KEYS:
@@ -59,31 +59,31 @@ def stated_model(table: Tables) -> tuple[list[Fault], Model | None]:
     name = table.get("name", "stated")
     if text_faults(name) or not name.strip():
         fault(f"found {short(name)}; accepted: a text of one line in quotes", "name")
-    if not given:
+    if not system_keys:
         fault(f"states no system; {_EXAMPLE}")
-    for alone, kept in _ALONE.items():
-        if alone in given and (others := [key for key in given if key != alone]):
-            fault(f"found together with {others[0]}; keep {kept}", alone)
+    for exclusive_key, alternatives in _EXCLUSIVE_KEYS.items():
+        if exclusive_key in system_keys and (other_keys := [key for key in system_keys if key != exclusive_key]):
+            fault(f"found together with {other_keys[0]}; keep {alternatives}", exclusive_key)
     texts = _quantities(table.get("quantities", {}), fault)
-    entries, quantities = parse_entries({key: _rows(table[key], key, fault) for key in given}, texts, fault)
+    entries, quantities = parse_entries({key: _rows(table[key], key, fault) for key in system_keys}, texts, fault)
     if faults:
         return faults, None
     try:
-        stated: dict[str, Any] = {**entries, "name": name.strip(), "quantities": quantities}
+        arguments: dict[str, Any] = {**entries, "name": name.strip(), "quantities": quantities}
         if "H" in entries:
-            return [], from_hamiltonian(**stated)
+            return [], from_hamiltonian(**arguments)
         if "coefficients" in entries:
-            return [], from_coefficients(**stated | {"coefficients": entries["coefficients"][0]})
-        return [], from_matrices(**stated)
+            return [], from_coefficients(**arguments | {"coefficients": entries["coefficients"][0]})
+        return [], from_matrices(**arguments)
     except Unfit as error:
-        where, _, rest = error.message.partition(": ")
-        if error.key == "quantities" and where in quantities:
-            return [Fault(rest, ("model", "quantities", where))], None
+        quantity, _, reason = error.message.partition(": ")
+        if error.key == "quantities" and quantity in quantities:
+            return [Fault(reason, ("model", "quantities", quantity))], None
         return [Fault(error.message, ("model", error.key))], None
 
 
 def _square(entries: Any) -> str:
-    """The advice for a flat list of n² entries; empty for anything else."""
+    """The advice to write a list of n² entries as n rows; empty for any other value."""
     n = math.isqrt(len(entries)) if isinstance(entries, list) else 0
     if not n or n * n != len(entries) or any(isinstance(x, list) for x in entries):
         return ""
@@ -114,6 +114,6 @@ def _rows(written: Any, key: str, fault: Callable[..., None]) -> Matrix:
     for i, row in enumerate(rows, start=1):
         for j, x in enumerate(row, start=1):
             if not is_number(x) and not isinstance(x, str):
-                found = f"{place(key, i, j)}: found {short(x)}"
-                fault(f"{found}; accepted: a finite number, or an expression in quotes", key)
+                message = f"{place(key, i, j)}: found {short(x)}"
+                fault(f"{message}; accepted: a finite number, or an expression in quotes", key)
     return [[x if is_number(x) or isinstance(x, str) else 0 for x in row] for row in rows]

@@ -9,32 +9,34 @@ from tmsopt.problem.cases import middle_of, parse_scenario, points_of
 from tmsopt.problem.units import TABLES, read_numbers
 from tmsopt.problem.validate import find_faults, shape_faults
 
-_POINT = 1e-12
-"""A range narrower than this, relative to its ends, is a single value."""
+_MIN_WIDTH = 1e-12
+"""Least width of a range relative to its ends; a narrower range counts as one value."""
 
 
-def normalise(**stated: Any) -> dict[str, Any]:
-    """The fields of a problem from stated values of any type.
+def normalise(**arguments: Any) -> dict[str, Any]:
+    """The fields of a problem, from arguments of any type.
 
     Raises:
         InputError: listing every fault.
     """
-    problem = SimpleNamespace(**stated)
-    if found := list(shape_faults(problem)):
-        raise InputError(found)
+    problem = SimpleNamespace(**arguments)
+    if faults := list(shape_faults(problem)):
+        raise InputError(faults)
     problem.scenarios = {n: parse_scenario(s) for n, s in problem.scenarios.items()}
     names = {**problem.fixed, **problem.free, **problem.scenarios}
     problem.model = controlled(problem.model, names)
     # The parameter set with most of the names; the native one in case of a tie.
-    of = max(problem.model.sets, key=lambda s: len(names.keys() & set(s.names)))
-    read, units, typed, unreadable = read_numbers({table: getattr(problem, table) for table in TABLES}, of)
-    vars(problem).update(read)
-    places = {f.key[:2] for f in unreadable}
-    if found := [*unreadable, *(f for f in find_faults(problem, of) if f.key[:2] not in places)]:
-        raise InputError(found)
+    parameter_set = max(problem.model.sets, key=lambda s: len(names.keys() & set(s.names)))
+    tables = {table: getattr(problem, table) for table in TABLES}
+    tables, units, typed, reading_faults = read_numbers(tables, parameter_set)
+    vars(problem).update(tables)
+    unreadable_keys = {f.key[:2] for f in reading_faults}
+    faults = reading_faults + [f for f in find_faults(problem, parameter_set) if f.key[:2] not in unreadable_keys]
+    if faults:
+        raise InputError(faults)
     problem.units = {**units, **problem.units}
     problem.written = {n: {**typed.get(n, {}), **problem.written.get(n, {})} for n in (*problem.written, *typed)}
-    defaults = {p.name: p.default for p in of.parameters if p.default is not None}
+    defaults = {p.name: p.default for p in parameter_set.parameters if p.default is not None}
     nominal = {n: middle_of(s) for n, s in problem.scenarios.items()}
     problem.fixed = {n: v for n, v in {**defaults, **nominal, **problem.fixed}.items() if n not in problem.free}
     for table in ("tolerances", "weights"):
@@ -45,21 +47,21 @@ def normalise(**stated: Any) -> dict[str, Any]:
     return complete_fields(**vars(problem))
 
 
-def complete_fields(**given: Any) -> dict[str, Any]:
-    """The fields of a problem from valid numbers and texts.
+def complete_fields(**fields: Any) -> dict[str, Any]:
+    """The complete fields of a problem, from fields with valid numbers and texts.
 
-    A range of one value becomes a fixed parameter, starts are kept for free parameters only, and a complex H gets a
-    carrier for the ranges.
+    A range of one value becomes a fixed parameter. Start values of parameters that are not free are dropped. A complex
+    H gets a carrier for the ranges.
     """
-    free = given["free"]
-    pinned = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _POINT * max(abs(lo), abs(hi))}
-    fixed = {n: float(v) for n, v in {**given["fixed"], **pinned}.items()}
-    free = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in pinned}
-    start = {n: float(v) for n, v in given["start"].items() if n in free}
-    reach = {n: (x, x) for n, x in fixed.items()} | free  # least and greatest value over all cases
-    for name, scenario in given["scenarios"].items():
+    free = fields["free"]
+    single_values = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _MIN_WIDTH * max(abs(lo), abs(hi))}
+    fixed = {n: float(v) for n, v in {**fields["fixed"], **single_values}.items()}
+    free = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in single_values}
+    start = {n: float(v) for n, v in fields["start"].items() if n in free}
+    ranges = {n: (x, x) for n, x in fixed.items()} | free  # least and greatest value over all cases
+    for name, scenario in fields["scenarios"].items():
         points = [*points_of(scenario), fixed[name]]
-        reach[name] = min(points), max(points)
-    rooms = {n: given["tolerances"].get(n, 0.0) for n in reach}
-    within = given["model"].within({n: (lo - rooms[n], hi + rooms[n]) for n, (lo, hi) in reach.items()})
-    return given | {"model": within, "fixed": fixed, "free": free, "start": start}
+        ranges[name] = min(points), max(points)
+    tolerances = {n: fields["tolerances"].get(n, 0.0) for n in ranges}
+    model = fields["model"].within({n: (lo - tolerances[n], hi + tolerances[n]) for n, (lo, hi) in ranges.items()})
+    return fields | {"model": model, "fixed": fixed, "free": free, "start": start}

@@ -107,46 +107,46 @@ class Problem(_Fields):
         units: Mapping[str, str] = Table(),
         written: Mapping[str, Mapping[float, str]] = Table(),
     ) -> None:
-        stated = locals()
-        vars(self).update(normalise(**{f.name: stated[f.name] for f in fields(self)}))
+        arguments = locals()
+        vars(self).update(normalise(**{f.name: arguments[f.name] for f in fields(self)}))
 
     @cached_property
     def posed(self) -> "Posed":
         """The problem as it is solved."""
-        found = Posed(**_field_values(self))
-        vars(found).update(problem=self)
-        return found
+        posed = Posed(**_field_values(self))
+        vars(posed).update(problem=self)
+        return posed
 
     if not TYPE_CHECKING:  # type checkers still report wrong names
 
         def __getattr__(self, name: str) -> Any:
-            """An attribute of a problem in version 1.1 that belongs to its `posed` now."""
+            """An attribute that a problem had in version 1.1; now its `posed` has it."""
             return read_from_posed(self, name)
 
 
 @dataclass(frozen=True, eq=False)
 class Posed(_Fields):
-    """A problem as it is solved: numbers, parsed expressions, cases. Compared by identity, so caches can use it."""
+    """A problem as it is solved: numbers, parsed expressions, cases. Two are equal only if identical, for caches."""
 
     def derive(self, **changes: Any) -> "Posed":
-        """The problem with some fields replaced by numbers in rad and SI and valid texts, without checks.
+        """The problem with some fields replaced, without checks. Numbers must be in rad and SI, and texts valid.
 
-        Do not use `dataclasses.replace`: it does not complete the fields.
+        `dataclasses.replace` must not be used instead, because it does not complete the fields.
         """
         return Posed(**complete_fields(**_field_values(self) | changes))
 
     @cached_property
     def problem(self) -> Problem:
         """The problem as stated."""
-        found = object.__new__(Problem)
-        vars(found).update(_field_values(self), posed=self)
-        return found
+        problem = object.__new__(Problem)
+        vars(problem).update(_field_values(self), posed=self)
+        return problem
 
     @cached_property
     def cases(self) -> tuple[Case, ...]:
         """The cases of the first search; none without scenarios, tolerances or robustness radius."""
-        far = radius_parameters(self.parameter_set, self.weights, self.fixed) if self.asks_radius else ()
-        return first_cases(self.scenarios, self.tolerances, far)
+        directions = radius_parameters(self.parameter_set, self.weights, self.fixed) if self.asks_radius else ()
+        return first_cases(self.scenarios, self.tolerances, directions)
 
     @property
     def nominal(self) -> "Posed":
@@ -179,14 +179,14 @@ class Posed(_Fields):
 
     @property
     def located(self) -> tuple[str, ...]:
-        """The names of the located pattern: as typed, such as ``EP2+EP2``, and its own, ``2EP2``."""
+        """The names of the located pattern: the typed one, such as ``EP2+EP2``, and the standard one, ``2EP2``."""
         return (str(self.locate), self.pattern.name) if self.pattern else ()
 
     @property
     def sense(self) -> str:
         """``minimize``, ``maximize``, ``pareto``, ``locate``, or ``evaluate`` without an objective."""
-        asked = (n for n in ("minimize", "maximize", "pareto", "locate") if getattr(self, n) not in (None, "", ()))
-        return next(asked, "evaluate")
+        senses = (n for n in ("minimize", "maximize", "pareto", "locate") if getattr(self, n) not in (None, "", ()))
+        return next(senses, "evaluate")
 
     @property
     def goal(self) -> str:
@@ -230,8 +230,8 @@ class Posed(_Fields):
     @property
     def vocabulary(self) -> tuple[str, ...]:
         """Every name that an expression may use."""
-        of = self.parameter_set
-        return (*of.names, *self.model.quantity_names(of), *root_names(self.model))
+        parameter_set = self.parameter_set
+        return (*parameter_set.names, *self.model.quantity_names(parameter_set), *root_names(self.model))
 
     def values(self, parameters: Numbers) -> Values:
         """Everything derived from a numeric design, including root quantities."""
@@ -240,21 +240,21 @@ class Posed(_Fields):
         return Values(self.model, self.parameter_set, parameters, extra=extra, ranges=ranges)
 
     def typed(self, parameters: Numbers) -> dict[str, str]:
-        """Parameter → exact number as typed, such as ``8/3`` or ``20 deg``, if its double differs."""
+        """Parameter → the text that was typed, such as ``8/3`` or ``20 deg``, if its double is not the exact number."""
         exact = {n: self.written.get(n, {}).get(x) for n, x in parameters.items()}
         return {n: text for n, text in exact.items() if text}
 
     def as_nodes(self, parameters: Numbers) -> dict[str, Node]:
-        """Parameters exactly as typed, as nodes of formulas."""
+        """Parameter → the exact number that was typed, as a node of a formula."""
         typed = self.typed(parameters)
         return {n: number(x, typed.get(n, "")) for n, x in parameters.items()}
 
     def exactly(self, parameters: Numbers) -> dict[str, Any]:
-        """Parameters exactly as typed, as fractions or balls of the working precision."""
+        """Parameter → the exact number that was typed, as a fraction, or as an interval of the working precision."""
         return {n: fold(formula([x]), {}, BALLS)[0] for n, x in self.as_nodes(parameters).items()}
 
     def ordered(self, values: AnyNumbers) -> dict[str, Any]:
-        """Every parameter in the model's order: the given values and the fixed ones."""
+        """Every parameter in the order of the model: the given values, and the fixed parameters."""
         complete = {**self.fixed, **values}
         return {name: complete[name] for name in self.parameter_set.names}
 
@@ -264,7 +264,7 @@ def _field_values(record: _Fields) -> dict[str, Any]:
     return {f.name: getattr(record, f.name) for f in fields(record)}
 
 
-def radius_parameters(of: ParameterSet, weights: Numbers, fixed: Numbers) -> tuple[str, ...]:
+def radius_parameters(parameter_set: ParameterSet, weights: Numbers, fixed: Numbers) -> tuple[str, ...]:
     """Parameters that change in the robustness radius; by default all that `Parameter.may_change` allows.
 
     Args:
@@ -272,4 +272,4 @@ def radius_parameters(of: ParameterSet, weights: Numbers, fixed: Numbers) -> tup
     """
     if weights:
         return tuple(n for n, w in weights.items() if w > 0)
-    return tuple(p.name for p in of.parameters if p.may_change(fixed.get(p.name, math.inf)))
+    return tuple(p.name for p in parameter_set.parameters if p.may_change(fixed.get(p.name, math.inf)))

@@ -15,29 +15,30 @@ from tmsopt.records import AnyNumbers, Array
 from tmsopt.roots import Root, Structure, exact_roots, structure
 
 STRUCTURE_TOLERANCE = 1e-11
-"""Roots count as multiple within this relative change of a coefficient; polished optima are within 1e-14."""
+"""Roots count as multiple if a relative change of the coefficients by this amount makes them so; optima need 1e-14."""
 
 SIMPLE = ("real", "pair", "undecided")
-"""Structures whose roots are the numeric ones."""
+"""Names of structures without multiple roots, whose roots are computed numerically."""
 
-_SCATTER, _ROUNDING = 1e-11, 4 * np.finfo(float).eps  # relative error of numeric roots that asks for exact ones
+_MAX_ERROR = 1e-11  # roots with a larger relative error are computed exactly
+_ROUNDING = 4 * np.finfo(float).eps  # relative rounding error of a term of a polynomial
 
-_DIGITS = 120  # so that products of five doubles are exact
+_DIGITS = 120  # decimal digits in which products of five doubles are exact
 
-_KEPT = 64  # structures in the cache, since several quantities use the same design
+_CACHE_SIZE = 64  # structures in the cache, because several quantities of a design use its structure
 
 _LARGEST_ROOT = 1e50
-"""Products of a few larger roots overflow."""
+"""Greatest size of a root; products of a few larger roots overflow."""
 
 
 def _may_have_huge_roots(a: Array) -> Any:
     """Whether the leading coefficient is 0, or so small that a root may be too large for doubles."""
-    ends = np.abs(a[..., 0]) * _LARGEST_ROOT <= np.abs(a).max(axis=-1)
-    if ends.any():
+    is_huge = np.abs(a[..., 0]) * _LARGEST_ROOT <= np.abs(a).max(axis=-1)
+    if is_huge.any():
         with np.errstate(all="ignore"):
             sizes = np.abs(a[..., 1:] / a[..., :1]) ** (1 / np.arange(1, a.shape[-1]))
-        ends &= ~(sizes.max(axis=-1) < _LARGEST_ROOT)  # also true for nan, if all are 0
-    return ends
+        is_huge &= ~(sizes.max(axis=-1) < _LARGEST_ROOT)  # also true for nan, if all are 0
+    return is_huge
 
 
 def _structure(values: AnyNumbers) -> Structure:
@@ -46,36 +47,36 @@ def _structure(values: AnyNumbers) -> Structure:
     undecided = Structure("undecided", (), math.inf)
     if not all(map(math.isfinite, a)) or _may_have_huge_roots(np.array(a)):
         return undecided  # a singular mass matrix: a root at infinity
-    off = values.roundings()
-    if abs(a[0]) <= off[0] < math.inf:
+    roundings = values.roundings()
+    if abs(a[0]) <= roundings[0] < math.inf:
         return undecided  # a0 may be 0 within rounding
-    found = _cached_structure(tuple(a), tuple(map(float, off)))
-    simple = found.name in SIMPLE and all(root.multiplicity == 1 for root in found.roots)
-    if simple and _scatter(np.array(a), found) > _SCATTER:
-        found = replace(found, roots=roots_at(*values.given) or found.roots)
-    return found
+    root_structure = _cached_structure(tuple(a), tuple(map(float, roundings)))
+    is_simple = root_structure.name in SIMPLE and all(root.multiplicity == 1 for root in root_structure.roots)
+    if is_simple and _root_error(np.array(a), root_structure) > _MAX_ERROR:
+        root_structure = replace(root_structure, roots=roots_at(*values.given) or root_structure.roots)
+    return root_structure
 
 
-def _scatter(a: Array, found: Structure) -> float:
+def _root_error(a: Array, root_structure: Structure) -> float:
     """Rounding error of simple numeric roots, relative to the largest root."""
-    z = np.array([complex(root.re, root.im) for root in found.roots])
+    z = np.array([complex(root.re, root.im) for root in root_structure.roots])
     terms, slope = np.polyval(np.abs(a), np.abs(z)), np.abs(np.polyval(np.polyder(a), z))
     return float((_ROUNDING * terms / (slope + np.finfo(float).tiny)).max() / (np.abs(z).max() or 1.0))
 
 
-@lru_cache(maxsize=_KEPT)
-def _cached_structure(a: tuple[float, ...], off: tuple[float, ...]) -> Structure:
-    return structure(a, STRUCTURE_TOLERANCE, off)
+@lru_cache(maxsize=_CACHE_SIZE)
+def _cached_structure(a: tuple[float, ...], roundings: tuple[float, ...]) -> Structure:
+    return structure(a, STRUCTURE_TOLERANCE, roundings)
 
 
-def roots_at(model: Model, of: ParameterSet, parameters: AnyNumbers) -> tuple[Root, ...]:
+def roots_at(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) -> tuple[Root, ...]:
     """Exact roots of the parameters as stored, rightmost first; none if a coefficient is undefined.
 
-    Coefficients have 120 digits, and roots are isolated in ball arithmetic.
+    Coefficients have 120 digits, and roots are isolated in interval arithmetic.
     """
     with flint.ctx.workdps(_DIGITS):
-        exact = {name: flint.arb(value) for name, value in parameters.items()}
-        coefficients = model.coefficients(exact, of)
+        exact_parameters = {name: flint.arb(value) for name, value in parameters.items()}
+        coefficients = model.coefficients(exact_parameters, parameter_set)
     if not all(c.is_finite() for c in coefficients):
         return ()
     leading = next((k for k, c in enumerate(coefficients) if c.mid() != 0), None)
@@ -86,7 +87,7 @@ def roots_at(model: Model, of: ParameterSet, parameters: AnyNumbers) -> tuple[Ro
 
 def _damping_ratio(values: AnyNumbers) -> float:
     if isinstance(values, Values) and values.model.carrier is not None:
-        return math.nan  # a complex system has no fixed zero of frequency
+        return math.nan  # the frequencies of a complex system have no fixed zero
     roots = values["structure"].roots
     ratios = (-r.re / r.size if r.re or r.im else 0.0 for r in roots)
     return min(ratios, default=math.nan)
@@ -106,7 +107,7 @@ ROOT_QUANTITIES = (
         lambda v: max((abs(r.im) for r in v["structure"].roots), default=math.nan),
     ),
 )
-"""Root quantities, each the worst over the cases of a problem."""
+"""Root quantities. In a problem with cases, each has its worst value over the cases."""
 
 STRUCTURE = Quantity("structure", "", "structure of the roots, multiple roots recognised", "", _structure)
 
@@ -116,7 +117,7 @@ RADIUS = "radius"
 _RADIUS = "robustness radius, the least change of the parameters, in their weights, after which it is unstable"
 
 NO_RADIUS = Quantity(RADIUS, "1", _RADIUS, "r", lambda values: math.nan)
-"""The radius before it was searched for."""
+"""The robustness radius as nan, until a search has found it."""
 
 ROOT_NAMES = (*(q.name for q in ROOT_QUANTITIES), RADIUS)
 
@@ -126,16 +127,16 @@ def root_names(model: Model) -> tuple[str, ...]:
     return tuple(name for name in ROOT_NAMES if name not in model.absent)
 
 
-def expand_names(text: str, of: ParameterSet) -> str:
-    """Replace short names in an expression: decay_rate by -(abscissa*sqrt(g/w)). Other types pass unchanged."""
-    short = {q.name: q.stands_for for q in of.quantities if q.stands_for}
-    if not short or not isinstance(text, str):
+def expand_names(text: str, parameter_set: ParameterSet) -> str:
+    """Replace short names, such as decay_rate by -(abscissa*sqrt(g/w)). A `text` of another type stays unchanged."""
+    expansions = {q.name: q.stands_for for q in parameter_set.quantities if q.stands_for}
+    if not expansions or not isinstance(text, str):
         return text
-    return re.sub(rf"\b({'|'.join(short)})\b", lambda found: short[found[0]], text)
+    return re.sub(rf"\b({'|'.join(expansions)})\b", lambda match: expansions[match[0]], text)
 
 
 def regularise(coefficients: Array) -> Array:
-    """Replace a leading coefficient of about 0 by a small one, which gives a distant root; undefined rows become sⁿ."""
+    """Replace a leading coefficient near 0 by a small number, for a large root; rows with nan or inf become sⁿ."""
     exist = np.all(np.isfinite(coefficients), axis=-1, keepdims=True)
     a = np.where(exist, coefficients, np.eye(coefficients.shape[-1])[0])
     size = np.abs(a).max(axis=-1, initial=0.0) + 1e-300
@@ -143,16 +144,16 @@ def regularise(coefficients: Array) -> Array:
 
 
 def lifted_quantities(
-    model: Model, of: ParameterSet, parameters: AnyNumbers, expressions: Iterable[Callable[[Values], Any]]
+    model: Model, parameter_set: ParameterSet, parameters: AnyNumbers, expressions: Iterable[Callable[[Values], Any]]
 ) -> tuple[Quantity, ...]:
-    """The quantities in expressions that are defined by an equation; proofs treat these as unknowns."""
-    found: dict[str, Quantity] = {}
+    """The quantities in expressions that have an equation; proofs treat them as unknowns."""
+    quantities: dict[str, Quantity] = {}
 
     def note(quantity: Quantity, values: Values) -> None:
         if quantity.equation is not None:
-            found[quantity.name] = quantity
+            quantities[quantity.name] = quantity
 
-    values = Values(model, of, parameters, lift=note).with_known(dict.fromkeys(ROOT_NAMES, math.nan))
+    values = Values(model, parameter_set, parameters, lift=note).with_known(dict.fromkeys(ROOT_NAMES, math.nan))
     for expression in expressions:
         expression(values)
-    return tuple(found.values())
+    return tuple(quantities.values())

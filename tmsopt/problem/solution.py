@@ -27,14 +27,14 @@ class Bound:
     """A value that no design in the box can beat.
 
     Attributes:
-        value: the bound; −inf without one.
+        value: the bound; −inf if there is none.
         gap: objective minus bound.
         proven: whether the gap is closed, so that the design is globally optimal: up to rounding, or by ``scip`` up to
             1e-4 of the objective. For an infeasible problem, whether infeasibility is proved.
         method: how the bound was found: ``omega0``, ``relation`` (of the coefficients), ``scip``, …; ``none``.
         seconds: time of branch and bound.
         nodes: nodes of branch and bound.
-        tolerance: feasibility tolerance of branch and bound, a proof in floating-point arithmetic.
+        tolerance: feasibility tolerance of branch and bound, which proves in floating-point arithmetic.
         solver: the solver that searched, such as ``SCIP``, even if the bound comes from elsewhere; empty without one.
 
     Example:
@@ -85,7 +85,7 @@ class Solution(Printable):
         violations: name → violation above tolerance, in the limit's units (rad, SI); for a pattern, relative to the
             coefficients.
         missed: limit on the roots that the ideal design meets → amount by which the stored parameters miss it, in the
-            limit's units. Empty if doubles near the ideal design meet all limits, since these are stored then.
+            limit's units. Empty if doubles near the ideal design meet all limits, because these doubles are stored.
         quantities: derived quantities; nan if undefined.
         dimensionless: the native parameters.
         formulation: ``abscissa``, ``matching`` or ``none``.
@@ -106,8 +106,8 @@ class Solution(Printable):
         meetings: the multiple roots with their eigenvectors: the located ones, then the others, rightmost first.
         edges: boundaries of stability that contain the design: ``weave``, ``capsize``, ``infinity``.
         edge_is_exact: whether `edges` and the growth there are certain, not only up to rounding.
-        multiple_as_rounded: with nothing free, whether roots are multiple only up to rounding.
-        without_best: whether designs improve without end, as towards a singular mass matrix, so that none is the best.
+        multiple_as_rounded: without free parameters, whether roots are multiple only up to rounding.
+        without_best: whether no design is the best, because designs improve without end, e.g. towards singular M.
         si: the design in s, Hz, mm, km/h, degrees, N and kg; empty unless the problem is written in SI.
 
     Example:
@@ -167,13 +167,13 @@ class Solution(Printable):
 
     @property
     def stable(self) -> bool | None:
-        """Whether all roots are left of the axis, ideal and as stored, in the worst case; None with one at infinity."""
+        """Whether all roots, ideal and as stored, are left of the axis in the worst case; None if one is infinite."""
         verdict = self.stability.verdict
         return verdict == STABLE if verdict else None
 
     @property
     def beyond_axis(self) -> float | None:
-        """Distance of the rightmost root right of the axis, if a located pattern ties others to it; else None."""
+        """Distance of the rightmost root to the right of the axis, for a located pattern on the axis; else None."""
         located = self.problem.posed.located if self.status == "optimal" else ()
         return beyond_axis(self.problem.model, located, self.roots)
 
@@ -191,9 +191,9 @@ class Solution(Printable):
         if self.stable:
             return True
         problem = self.problem.posed
-        least = (problem.minimize or "").strip() == "abscissa" and not problem.asked_of_roots
-        bounded = least and self.status == "optimal" and self.bound.value >= 0
-        return False if bounded else self.stable_elsewhere
+        minimises_abscissa = (problem.minimize or "").strip() == "abscissa" and not problem.asked_of_roots
+        is_excluded = minimises_abscissa and self.status == "optimal" and self.bound.value >= 0
+        return False if is_excluded else self.stable_elsewhere
 
     @property
     def units(self) -> dict[str, str]:
@@ -213,20 +213,20 @@ class Solution(Printable):
 
     @property
     def of_polynomial(self) -> Structure:
-        """Structure and roots of the model's polynomial; for a complex system, of the real one of twice the size."""
+        """Structure and roots of the model's polynomial; for a complex system, of its real system of twice the size."""
         return polynomial_structure(self.problem.model, self.structure, self.roots)
 
-    def response(self, **asked: Any) -> Any:
+    def response(self, **arguments: Any) -> Any:
         """The motion of this design after a lean or a push, as a `tmsopt.Simulation`.
 
         Args:
-            asked: the arguments of `tmsopt.simulate`: ``lean=5`` (degrees), ``push=10`` (N m s), ``seconds=3``,
+            arguments: the arguments of `tmsopt.simulate`: ``lean=5`` (degrees), ``push=10`` (N m s), ``seconds=3``,
                 ``noise=1`` …
 
         Raises:
             InputError: for a model without matrices, or an argument that it does not accept.
         """
-        return call_documents("response", self, **asked)
+        return call_documents("response", self, **arguments)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; undefined numbers are None.

@@ -14,16 +14,16 @@ from tmsopt.files import as_path, read_text
 from tmsopt.problem.advice.lines import suggest_line
 
 MOST_PARTS, MOST_DEEP, LONGEST_WORD = 10, 50, 1000
-"""Parts of a dotted key; depth of nested lists and tables; characters of a number or of a name without quotes."""
+"""Greatest number of parts of a dotted key, depth of lists and tables, length of a number or an unquoted name."""
 
-_EXPLAINED = 10 * LISTED  # complaints explained; a key may have several
+_MAX_EXPLAINED = 10 * LISTED  # greatest number of explained error messages of pydantic; a key may have several
 
 Number = StrictFloat | StrictInt | StrictStr
 """A number, or a text with a unit."""
 
 
 class Section(BaseModel):
-    """A table of a file without other keys; the docstring of a field describes its key."""
+    """A table of a file that allows no other keys than its fields; the docstring of a field describes the key."""
 
     model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
@@ -49,8 +49,8 @@ class Page:
 
     def error(self, faults: Iterable[Fault]) -> InputError:
         """The faults in the order of their lines; a fault without a file is located in this one."""
-        placed = [f if f.file else f.at(self.file, self._line_of(f.key)) for f in faults]
-        return InputError(sorted(placed, key=lambda f: f.line))
+        located_faults = [f if f.file else f.at(self.file, self._line_of(f.key)) for f in faults]
+        return InputError(sorted(located_faults, key=lambda f: f.line))
 
     def _line_of(self, key: Key) -> int:
         """Line of the longest prefix of a key path that the file has; 1 if it has none."""
@@ -82,10 +82,10 @@ def read_page(path: str | PathLike[str], kind: str) -> Page:
 def validate_tables(
     data: Tables, schema: type[S], explain: Callable[[tuple[int | str, ...], str, Any], Fault]
 ) -> tuple[list[Fault], S | None]:
-    """Faults of shape, and the data without the faulty keys.
+    """The faults in the types and keys of the data, and the data without the faulty keys; None if that fails.
 
     Args:
-        explain: turns the place, kind and value of a complaint into a fault in the words of the file.
+        explain: turns the place, kind and value of an error message of pydantic into a fault in the words of the file.
     """
     faults: dict[Key, Fault] = {}
     pruned: dict[str, Any] = dict(data)
@@ -94,13 +94,13 @@ def validate_tables(
             return list(faults.values()), schema.model_validate(pruned)
         except ValidationError as error:
             complaints = error.errors(include_url=False, include_context=False)
-            found = [explain(d["loc"], d["type"], d["input"]) for d in complaints[:_EXPLAINED]]
-            rest = dict.fromkeys(tuple(map(str, d["loc"][:2])) for d in complaints[_EXPLAINED:])
-            found += [Fault("accepted: see the other faults", key) for key in rest]
+            explained = [explain(d["loc"], d["type"], d["input"]) for d in complaints[:_MAX_EXPLAINED]]
+            remaining_keys = dict.fromkeys(tuple(map(str, d["loc"][:2])) for d in complaints[_MAX_EXPLAINED:])
+            explained += [Fault("accepted: see the other faults", key) for key in remaining_keys]
             deepest: dict[Key, int] = {}
-            for fault in found:
+            for fault in explained:
                 deepest[fault.key[:2]] = max(len(fault.key), deepest.get(fault.key[:2], 0))
-            for fault in found:
+            for fault in explained:
                 if len(fault.key) == deepest[fault.key[:2]]:
                     faults.setdefault(fault.key, fault)
         pruned = _drop_keys(pruned, {key[:2] for key in faults})
@@ -108,9 +108,10 @@ def validate_tables(
 
 
 def _drop_keys(data: Tables, keys: set[Key]) -> dict[str, Any]:
-    inner = {n: {k: v for k, v in t.items() if (n, k) not in keys} for n, t in data.items() if isinstance(t, dict)}
-    plain = {n for n, *rest in keys if not rest or n not in inner}
-    return {n: inner.get(n, value) for n, value in data.items() if n not in plain}
+    tables = {n: t for n, t in data.items() if isinstance(t, dict)}
+    inner_tables = {n: {k: v for k, v in t.items() if (n, k) not in keys} for n, t in tables.items()}
+    dropped_names = {n for n, *rest in keys if not rest or n not in inner_tables}
+    return {n: inner_tables.get(n, value) for n, value in data.items() if n not in dropped_names}
 
 
 _TOKEN = re.compile(
@@ -118,7 +119,7 @@ _TOKEN = re.compile(
     r"""|\"(?:[^"\\\n]++|\\[^\n])*+"?|'[^'\n]*+'?|\#[^\n]*+|[\w+:-]++|[^ \t\r]""",
     re.DOTALL,
 )
-"""Possessive quantifiers: linear time for any text. A string that is not closed ends with the file."""
+"""Matches a token. Possessive quantifiers give linear time for any text. An unclosed string ends with the file."""
 
 _MARKS = frozenset("[]{}=.,")
 _STATEMENT = re.compile(r"[ \t]*+(?:[\w.\-\"' \t]++=|\[[A-Za-z_][\w.]*+\][ \t]*+(?:\#[^\n]*+)?$)", re.MULTILINE)
@@ -126,7 +127,7 @@ _STATEMENT = re.compile(r"[ \t]*+(?:[\w.\-\"' \t]++=|\[[A-Za-z_][\w.]*+\][ \t]*+
 
 @dataclass
 class _Scan:
-    """The lines of a file before parsing, and a fault if it must not be parsed.
+    """What a scan finds in a file before it is parsed: the lines of keys, and a fault that prevents parsing.
 
     Attributes:
         lines: section or key → number of its line, except inside lists and multi-line strings.
@@ -139,19 +140,19 @@ class _Scan:
 
 
 def _scan_lines(text: str) -> _Scan:
-    """Find the lines of sections and keys; stop at text that would cost the parser too much time or memory."""
-    found = _Scan()
+    """Find the lines of sections and keys. The scan stops at text that the parser could not parse in time or memory."""
+    scan = _Scan()
     section: Key = ()
-    line, begun, depth, run = 1, 1, 0, 0
+    line, statement_line, depth, key_parts = 1, 1, 0, 0
     head: list[str] | None = []  # parts of the current section or key; None inside a value
-    end = previous = "="  # end of the head, "]" for a section; the previous token
+    end = previous_token = "="  # end of the head, "]" for a section; the previous token
     for match in _TOKEN.finditer(text):
         token = match[0]
         if token == "\n":
             if depth == 0:
-                head, end, begun = [], "=", line + 1
-            elif not found.unclosed and _STATEMENT.match(text, match.end()):
-                found.unclosed = begun
+                head, end, statement_line = [], "=", line + 1
+            elif not scan.unclosed and _STATEMENT.match(text, match.end()):
+                scan.unclosed = statement_line
         elif token in _MARKS:
             if head is None:
                 depth = max(0, depth + (token in "[{") - (token in "]}"))
@@ -160,23 +161,23 @@ def _scan_lines(text: str) -> _Scan:
             elif token == end:
                 key = tuple(head)
                 section, key = (key, key) if end == "]" else (section, (*section, *key))
-                found.lines.setdefault(key, line)
+                scan.lines.setdefault(key, line)
                 head = None
         elif token[0] != "#":
-            run = run + 1 if previous == "." else 1
+            key_parts = key_parts + 1 if previous_token == "." else 1
             if head is not None:
                 head.append(token.strip("\"'"))
-        if wrong := _size_problem(token, run, depth):
-            found.fault = Fault(wrong, line=line)
+        if message := _size_problem(token, key_parts, depth):
+            scan.fault = Fault(message, line=line)
             break
         line += token.count("\n")
-        previous = token
-    found.unclosed = found.unclosed or (begun if depth else 0)
-    return found
+        previous_token = token
+    scan.unclosed = scan.unclosed or (statement_line if depth else 0)
+    return scan
 
 
 def _size_problem(token: str, parts: int, depth: int) -> str:
-    """The message for a size above the limits; empty if it is within them."""
+    """The message for a key, depth or word above its limit; empty if all are within the limits."""
     if parts > MOST_PARTS:
         return f"found a key of more than {MOST_PARTS} parts; accepted: up to {MOST_PARTS}"
     if depth > MOST_DEEP:

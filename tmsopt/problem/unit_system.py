@@ -1,4 +1,4 @@
-"""Finds the units of a problem's parameters, quantities and expressions, as its author wrote them."""
+"""Finds the units of the parameters, quantities and expressions of a problem, as its author wrote them."""
 
 import math
 import re
@@ -26,7 +26,7 @@ class Unit:
 
     Attributes:
         text: its name, such as ``km/h``; empty without one.
-        one: its size in the unit of the stored number (SI, rad).
+        one: number of stored units (SI, rad) in one of this unit: 0.01 for cm.
     """
 
     text: str = ""
@@ -37,7 +37,7 @@ class Unit:
 
         Args:
             digits: greatest number of digits.
-            error: error of the value: digits that it makes uncertain are dropped, and values within it are 0.
+            error: error of the value. Uncertain digits are left out, and a value smaller than its error becomes 0.
         """
         if not math.isfinite(value):
             return "none"
@@ -62,26 +62,29 @@ def unit_of(problem: Posed, text: str) -> Unit:
     name = text.strip().removesuffix(".min").removesuffix(".max").removesuffix(".limit")
     if name in problem.parameter_set.names:
         return _make_unit(problem.units.get(name, ""), units[name])
-    used = set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name)))
-    if units.get(_FREQUENCY) == _HERTZ and used == {_FREQUENCY}:
+    names = set(re.findall(r"[A-Za-z_]\w*", problem.constraints.get(name, name)))
+    if units.get(_FREQUENCY) == _HERTZ and names == {_FREQUENCY}:
         return Unit(_HERTZ)
-    return _usual_unit(problem, Dimension.of(units[name]) if name in units else dimension_of(problem, text, units))
+    return _usual_unit(
+        problem, Dimension.from_unit(units[name]) if name in units else dimension_of(problem, text, units)
+    )
 
 
 def rate_of(problem: Posed, text: str, parameters: AnyNumbers) -> Any:
-    """The factor from √(g/w) to 1/s for an expression with that unit; None for other units or without seconds.
+    """The factor from √(g/w) to 1/s for an expression in √(g/w); None for other units or without a unit of time.
 
     Args:
         parameters: a design, or arrays of designs.
     """
-    of = problem.parameter_set
-    if of.rate is None or of.root_unit == _PER_SECOND or unit_of(problem, text).text != of.root_unit:
+    parameter_set = problem.parameter_set
+    rate, root_unit = parameter_set.rate, parameter_set.root_unit
+    if rate is None or root_unit == _PER_SECOND or unit_of(problem, text).text != root_unit:
         return None
-    return of.rate(parameters)
+    return rate(parameters)
 
 
 def unit_at(problem: Posed, text: str, parameters: Numbers) -> Unit:
-    """The unit to show an expression in at a design: rates in 1/s if the parameters define seconds."""
+    """The unit in which reports show an expression at a design: 1/s for rates, if the parameters define seconds."""
     rate = rate_of(problem, text, parameters)
     return unit_of(problem, text) if rate is None else Unit(_PER_SECOND, 1 / float(rate))
 
@@ -101,20 +104,21 @@ def common_unit(problem: Posed, text: str, common: Numbers | None = None) -> Uni
 
 
 def show_at(problem: Posed, text: str, parameters: Numbers, value: float, digits: int = 5) -> str:
-    """A number in the unit of `unit_at`, followed by its own unit in parentheses if that differs."""
-    shown, own = unit_at(problem, text, parameters), unit_of(problem, text)
-    behind = f" ({own.show(value, digits)})" if shown != own and math.isfinite(value) else ""
-    return f"{shown.show(value, digits)}{behind}"
+    """A number in the unit of `unit_at`, followed by the number in the unit of `unit_of` if that differs."""
+    display_unit, stored_unit = unit_at(problem, text, parameters), unit_of(problem, text)
+    suffix = f" ({stored_unit.show(value, digits)})" if display_unit != stored_unit and math.isfinite(value) else ""
+    return f"{display_unit.show(value, digits)}{suffix}"
 
 
 def si_units(problem: Posed) -> dict[str, str]:
-    """Name → unit in which a parameter, quantity or root quantity is computed; ``1`` without one."""
-    of = problem.parameter_set
-    listed: tuple[Parameter | Quantity, ...] = (*problem.model.quantities, *of.quantities, *of.parameters)
-    rates = {"abscissa": of.root_unit, ANGULAR_FREQUENCY: of.root_unit}
-    if of.rate is not None:  # the parameters define seconds
+    """Name → unit in which a parameter, quantity or root quantity is computed; ``1`` without a unit."""
+    parameter_set = problem.parameter_set
+    quantities = (*problem.model.quantities, *parameter_set.quantities)
+    items: tuple[Parameter | Quantity, ...] = (*quantities, *parameter_set.parameters)
+    rates = {"abscissa": parameter_set.root_unit, ANGULAR_FREQUENCY: parameter_set.root_unit}
+    if parameter_set.rate is not None:  # the parameters define seconds
         rates |= {"decay_rate": _PER_SECOND, "decay_time": "s", _FREQUENCY: _HERTZ}
-    return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in listed}
+    return dict.fromkeys(problem.vocabulary, "1") | rates | {q.name: q.unit for q in items}
 
 
 def amounts_text(problem: Posed, amounts: Numbers) -> str:
@@ -159,9 +163,10 @@ def dimension_of(problem: Posed, text: str, units: Mapping[str, str] | None = No
 
 def _usual_unit(problem: Posed, dimension: Dimension) -> Unit:
     """The unit that most parameters of a dimension were typed in."""
-    of, unit = problem.parameter_set, dimension.unit
-    typed = Counter(problem.units[n] for n in of.names if n in problem.units and Dimension.of(of[n].unit) == dimension)
-    return _make_unit(typed.most_common(1)[0][0] if typed else "", unit)
+    parameter_set, unit = problem.parameter_set, dimension.unit
+    parameters = (p for p in parameter_set.parameters if p.name in problem.units)
+    typed_units = Counter(problem.units[p.name] for p in parameters if Dimension.from_unit(p.unit) == dimension)
+    return _make_unit(typed_units.most_common(1)[0][0] if typed_units else "", unit)
 
 
 def _make_unit(written: str, unit: str) -> Unit:

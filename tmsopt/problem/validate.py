@@ -1,4 +1,4 @@
-"""Validates a problem: finds every fault, with its key and the accepted values."""
+"""Validates a problem: finds every fault, and reports it with its key and the accepted values."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ MOST_TOLERANCES = 8
 MOST_ENTRIES = {"constraints": 1000, "scenarios": 100}
 """Greatest number of constraints of a problem, and of values of a scenario."""
 
-_LONGEST = 200  # characters of the name of a pattern
+_MAX_PATTERN_NAME = 200  # characters of the name of a pattern
 
 Stated = Any
 """A problem as stated; any field may have any type."""
@@ -48,7 +48,7 @@ _TABLES = {
 
 
 def shape_faults(problem: Stated) -> Iterator[Fault]:
-    """Faults of the types of the arguments: model, tables and texts."""
+    """Faults of arguments that have a wrong type, and of tables that are too large."""
     if not isinstance(problem.model, Model):
         accepted = "a model, such as tmsopt.models.tms"
         yield Fault(f"found {type(problem.model).__name__}; accepted: {accepted}", ("model",))
@@ -69,44 +69,44 @@ def _size_faults(what: str, values: Any, *key: str) -> Iterator[Fault]:
         yield Fault(f"found {len(values)}; accepted: up to {MOST_ENTRIES[what]}", key)
 
 
-def find_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
-    """Every fault of a problem in a parameter set, whose arguments have the right types."""
+def find_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
+    """Every fault of a problem in the parameters of a set; the arguments must have the right types."""
     checks = (_name_faults, _value_faults, _need_faults, _variation_faults, _objective_faults, _expression_faults)
-    return chain.from_iterable(check(problem, of) for check in checks)
+    return chain.from_iterable(check(problem, parameter_set) for check in checks)
 
 
-def _name_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
-    others = {n: s.name for s in problem.model.sets if s is not of for n in s.names}
+def _name_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
+    other_sets = {n: s.name for s in problem.model.sets if s is not parameter_set for n in s.names}
     advice = limit_advice(suggest_name)
     tables = {"parameters": {**problem.fixed, **problem.free}} | {t: getattr(problem, t) for t in VARIATIONS}
-    for table, name in ((t, n) for t, names in tables.items() for n in names if n not in of.names):
+    for table, name in ((t, n) for t, names in tables.items() for n in names if n not in parameter_set.names):
         message = f"unknown parameter {short(name)}; "
-        if name in others:
+        if name in other_sets:
             message = (
-                f"{others[name]} parameter '{name}' among {of.name} ones; do not mix the two sets: "
-                f"write all parameters in one ({' '.join(of.names)})"
+                f"{other_sets[name]} parameter '{name}' among {parameter_set.name} ones; do not mix the two sets: "
+                f"write all parameters in one ({' '.join(parameter_set.names)})"
             )
         else:
-            message += advice(name, problem.model, of, of.names)
+            message += advice(name, problem.model, parameter_set, parameter_set.names)
         yield Fault(message, (table, name))
     for name in problem.fixed:
         if name in problem.free:
             yield Fault(f"'{name}' is both fixed and free; keep one", ("parameters", name))
-    given = tables["parameters"].keys() | problem.scenarios
-    if missing := [p.name for p in of.parameters if p.name not in given and p.default is None]:
-        example = " or ".join(example_of(of[missing[0]]))
-        meant = "".join(f"; {AMBIGUOUS_NAMES[name]}" for name in missing if name in AMBIGUOUS_NAMES)
-        yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}{meant}", ("parameters",))
+    given_names = tables["parameters"].keys() | problem.scenarios
+    if missing := [p.name for p in parameter_set.parameters if p.name not in given_names and p.default is None]:
+        example = " or ".join(example_of(parameter_set[missing[0]]))
+        explanations = "".join(f"; {AMBIGUOUS_NAMES[name]}" for name in missing if name in AMBIGUOUS_NAMES)
+        yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}{explanations}", ("parameters",))
     for name in problem.start:
         if name not in problem.free:
             yield Fault(f"found a start for '{name}'; accepted: free parameters", ("parameters", name, "start"))
 
 
-def _value_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
-    for name in of.names:
+def _value_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
+    for name in parameter_set.names:
         key = ("parameters", name)
         if name in problem.fixed:
-            yield from _number_faults(of, name, problem.fixed[name], *key)
+            yield from _number_faults(parameter_set, name, problem.fixed[name], *key)
         if name in problem.free:
             try:
                 lower, upper = problem.free[name]
@@ -114,82 +114,85 @@ def _value_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
                 yield Fault(f"found {short(problem.free[name])}; accepted: a pair (least, greatest)", key)
                 continue
             start = {"start": problem.start[name]} if name in problem.start else {}
-            found = _ends_faults(of, name, {"min": lower, "max": upper, **start}, *key)
-            yield from found
-            if start and not found and not lower <= start["start"] <= upper:
+            faults = _ends_faults(parameter_set, name, {"min": lower, "max": upper, **start}, *key)
+            yield from faults
+            if start and not faults and not lower <= start["start"] <= upper:
                 message = f"start = {start['start']:.6g} lies outside the bounds {lower:.6g} … {upper:.6g}"
                 yield Fault(message, (*key, "start"))
 
 
-def _ends_faults(of: ParameterSet, name: str, ends: AnyNumbers, *key: str) -> list[Fault]:
-    """Faults of the ends of a range and of a start in it; the ends of a band differ."""
-    found = [f for end, value in ends.items() for f in _number_faults(of, name, value, *key, end)]
+def _ends_faults(parameter_set: ParameterSet, name: str, ends: AnyNumbers, *key: str) -> list[Fault]:
+    """Faults of the ends of a range and of its start value; the ends of a band must differ."""
+    faults = [f for end, value in ends.items() for f in _number_faults(parameter_set, name, value, *key, end)]
     lower, upper = ends["min"], ends["max"]
-    if not found and (lower > upper or (lower == upper and key[0] == "scenarios")):
+    if not faults and (lower > upper or (lower == upper and key[0] == "scenarios")):
         order = "greater than" if lower > upper else "not less than"
-        found = [Fault(f"min = {lower:.6g} is {order} max = {upper:.6g}; swap them", key)]
-    return found
+        faults = [Fault(f"min = {lower:.6g} is {order} max = {upper:.6g}; swap them", key)]
+    return faults
 
 
-def _need_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
-    """Faults of parameters that may differ from 0 while a parameter that they require may be 0."""
-    for name, (needed, otherwise) in of.needs.items():
-        if min(_possible_values(problem, of, needed), default=1.0) <= 0 and any(_possible_values(problem, of, name)):
-            message = f"{needed} may be 0 while {name} is not: {otherwise}; keep {needed} above 0, or leave {name} out"
-            yield Fault(message, ("parameters", needed))
+def _need_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
+    """Faults of parameters that may differ from 0 while another parameter, which they need, may be 0."""
+    for name, (needed_name, reason) in parameter_set.needs.items():
+        least = min(_possible_values(problem, parameter_set, needed_name), default=1.0)
+        if least <= 0 and any(_possible_values(problem, parameter_set, name)):
+            message = (
+                f"{needed_name} may be 0 while {name} is not: {reason}; keep {needed_name} above 0, or leave {name} out"
+            )
+            yield Fault(message, ("parameters", needed_name))
 
 
-def _possible_values(problem: Stated, of: ParameterSet, name: str) -> list[float]:
-    """Values that a parameter may take: its ends, its scenario points, or its fixed value; none if not numeric."""
+def _possible_values(problem: Stated, parameter_set: ParameterSet, name: str) -> list[float]:
+    """Extreme values of a parameter: ends of its range, scenario points, or its fixed value; empty if not numeric."""
     try:
-        given = problem.free.get(name) or points_of(problem.scenarios.get(name, ()))
-        return [float(x) for x in given or (problem.fixed.get(name, of[name].default),)]
+        values = problem.free.get(name) or points_of(problem.scenarios.get(name, ()))
+        return [float(x) for x in values or (problem.fixed.get(name, parameter_set[name].default),)]
     except (TypeError, ValueError, OverflowError):
         return []
 
 
-def _variation_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+def _variation_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
     for name, scenario in problem.scenarios.items():
-        if name in of.names:
-            yield from _scenario_faults(problem, of, name, scenario)
-    for table, needed in (("tolerances", "greater than 0"), ("weights", "0 or greater")):
+        if name in parameter_set.names:
+            yield from _scenario_faults(problem, parameter_set, name, scenario)
+    for table, accepted in (("tolerances", "greater than 0"), ("weights", "0 or greater")):
         for name, value in getattr(problem, table).items():
-            if name not in of.names:
+            if name not in parameter_set.names:
                 continue
             size = _number(value)
             if not _has_usable_size(size) or size < 0 or (size == 0 and table == "tolerances"):
-                sizes = f"a number {needed}, of a size from {SMALLEST:g} to {1 / SMALLEST:g}"
+                sizes = f"a number {accepted}, of a size from {SMALLEST:g} to {1 / SMALLEST:g}"
                 yield Fault(f"found {short(value)}; accepted: {sizes}", (table, name))
             elif table == "tolerances":
-                yield from _tolerance_faults(problem, of, name, size)
-    if (found := len(problem.tolerances)) > MOST_TOLERANCES:
-        message = f"found {found} tolerances; accepted: up to {MOST_TOLERANCES}; keep those that matter most"
+                yield from _tolerance_faults(problem, parameter_set, name, size)
+    if (count := len(problem.tolerances)) > MOST_TOLERANCES:
+        message = f"found {count} tolerances; accepted: up to {MOST_TOLERANCES}; keep those that matter most"
         yield Fault(message, ("tolerances",))
 
 
-def _scenario_faults(problem: Stated, of: ParameterSet, name: str, scenario: Any) -> Iterator[Fault]:
+def _scenario_faults(problem: Stated, parameter_set: ParameterSet, name: str, scenario: Any) -> Iterator[Fault]:
     key = ("scenarios", name)
     if name in problem.free:
         yield Fault(f"'{name}' is both free and in scenarios; keep one", key)
     if isinstance(scenario, Band):
-        yield from _ends_faults(of, name, {"min": scenario.min, "max": scenario.max}, *key)
+        yield from _ends_faults(parameter_set, name, {"min": scenario.min, "max": scenario.max}, *key)
         if isinstance(scenario.points, bool) or not isinstance(scenario.points, int) or not 2 <= scenario.points <= 99:
             yield Fault(f"points = {short(scenario.points)}; accepted: a whole number from 2 to 99", (*key, "points"))
     elif not isinstance(scenario, Sequence) or isinstance(scenario, str) or not scenario:
         yield Fault(f"found {short(scenario)}; accepted: {{ min = …, max = …, points = … }}, or a list of values", key)
     else:
         for value in scenario:
-            yield from _number_faults(of, name, value, *key)
+            yield from _number_faults(parameter_set, name, value, *key)
 
 
-def _tolerance_faults(problem: Stated, of: ParameterSet, name: str, tolerance: float) -> Iterator[Fault]:
+def _tolerance_faults(problem: Stated, parameter_set: ParameterSet, name: str, tolerance: float) -> Iterator[Fault]:
     """Faults of a tolerance that exceeds the physical range of its parameter."""
-    ends = _possible_values(problem, of, name)
+    parameter, ends = parameter_set[name], _possible_values(problem, parameter_set, name)
     for value in (min(ends) - tolerance, max(ends) + tolerance) if ends else ():
-        if value not in of[name].range:
+        if value not in parameter.range:
             message = (
                 f"with the tolerance {tolerance:.6g}, {name} reaches {value:.6g}, which is not physical: "
-                f"{of[name].meaning} is {of[name].range}; keep {name} off the end of its range by the tolerance"
+                f"{parameter.meaning} is {parameter.range}; keep {name} off the end of its range by the tolerance"
             )
             yield Fault(message, ("tolerances", name))
 
@@ -203,12 +206,12 @@ def _number(value: Any) -> float:
 
 
 def _has_usable_size(number: float) -> bool:
-    """Whether a number is 0, or neither so small nor so large that products of a few overflow or underflow."""
+    """Whether a number is 0, or of a size at which products of a few numbers do not overflow or underflow."""
     return number == 0 or SMALLEST <= abs(number) <= 1 / SMALLEST
 
 
-def _number_faults(of: ParameterSet, name: str, value: Any, *key: str) -> Iterator[Fault]:
-    parameter, number = of[name], _number(value)
+def _number_faults(parameter_set: ParameterSet, name: str, value: Any, *key: str) -> Iterator[Fault]:
+    parameter, number = parameter_set[name], _number(value)
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     if not math.isfinite(number):
         yield Fault(f"found {short(value)}; accepted: a finite number{unit and ' in' + unit}", key)
@@ -218,17 +221,17 @@ def _number_faults(of: ParameterSet, name: str, value: Any, *key: str) -> Iterat
         hint = f'; write "{number:.6g} deg" for degrees' if parameter.unit == "rad" and abs(number) < 90 else ""
         if -number in parameter.range and parameter.meaning.endswith("downward"):
             hint = f"; z points down: write {-number:.6g}{unit} for what is above the ground"
-        found = f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}{hint}"
-        yield Fault(found, key)
+        message = f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}{hint}"
+        yield Fault(message, key)
 
 
-def _objective_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
+def _objective_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
     key = ("objective",)
-    asked = [sense for sense in ("minimize", "maximize") if getattr(problem, sense) is not None]
-    if len(asked) > 1:
+    senses = [sense for sense in ("minimize", "maximize") if getattr(problem, sense) is not None]
+    if len(senses) > 1:
         yield Fault("found both minimize and maximize; keep one of them", key)
-    if problem.pareto and asked:
-        yield Fault(f"found both pareto and {asked[0]}; keep one of them", key)
+    if problem.pareto and senses:
+        yield Fault(f"found both pareto and {senses[0]}; keep one of them", key)
     texts = _list_pareto(problem)
     if texts is None or len(texts) not in (0, 2, 3) or len({str(t).strip() for t in texts}) < len(texts):
         accepted = "two or three different expressions to minimise, such as ['abscissa', 'Fr', '-lambda_s']"
@@ -246,28 +249,28 @@ def _list_pareto(problem: Stated) -> Sequence[Any] | None:
 
 def _pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fault]:
     try:
-        if not isinstance(name, str) or len(name) > _LONGEST:
+        if not isinstance(name, str) or len(name) > _MAX_PATTERN_NAME:
             raise ValueError(f"{short(name)} is no pattern")
-        known = dict(zip(model.words, ("weave", "capsize"), strict=True)).get(name, name)
-        if known != name and known in patterns_of(model):
-            yield Fault(f"unknown pattern: '{name}' is {known} in data; write {known}", key)
+        data_name = dict(zip(model.words, ("weave", "capsize"), strict=True)).get(name, name)
+        if data_name != name and data_name in patterns_of(model):
+            yield Fault(f"unknown pattern: '{name}' is {data_name} in data; write {data_name}", key)
         else:
             pattern_of(model, name)
     except ValueError as error:
-        joined = ", or several, joined by +" if model.degree > 4 else ""
-        yield Fault(f"unknown pattern: {error}; {suggest(str(name), patterns_of(model))}{joined}", key)
+        hint = ", or several, joined by +" if model.degree > 4 else ""
+        yield Fault(f"unknown pattern: {error}; {suggest(str(name), patterns_of(model))}{hint}", key)
 
 
-def _expression_faults(problem: Stated, of: ParameterSet) -> Iterator[Fault]:
-    accepted = (*of.names, *public_names(problem.model, of), *root_names(problem.model))
+def _expression_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
+    accepted = (*parameter_set.names, *public_names(problem.model, parameter_set), *root_names(problem.model))
     advice = limit_advice(suggest_name)
 
     def parse_faults(parse: Any, text: Any, *key: str) -> Iterator[Fault]:
         try:
             parse(text, accepted)
-            parse(expand_names(text, of), accepted)  # may be too long even if the text is not
+            parse(expand_names(text, parameter_set), accepted)  # may be too long even if the text is not
         except UnknownName as error:
-            yield Fault(f"{error.found}; {advice(error.name, problem.model, of)}", key)
+            yield Fault(f"{error.found}; {advice(error.name, problem.model, parameter_set)}", key)
         except ExpressionError as error:
             yield Fault(str(error), key)
 

@@ -10,9 +10,9 @@ from tmsopt.models.tables import read_table
 from tmsopt.records import AnyNumbers
 
 WORDS = "weave", "capsize"
-"""Names for instability by a pair on the imaginary axis, and by a root 0."""
+"""Names of the two ways to lose stability: a pair of roots on the imaginary axis, and a root 0."""
 
-_TINY = 1e-300  # avoids 0/0 where all masses lie on the ground line; negligible elsewhere
+_TINY = 1e-300  # prevents 0/0 if all masses are on the ground; it changes no other result
 
 
 def omega0(v: AnyNumbers) -> Any:
@@ -21,25 +21,25 @@ def omega0(v: AnyNumbers) -> Any:
 
 
 def omega0_equation(v: AnyNumbers, x: Any) -> Any:
-    """0 exactly if x is ω0, within its range."""
+    """An expression that is 0 exactly if x = ω0, for x within the range of ω0."""
     return x * x * x * x * v["a0"] - v["a4"]
 
 
 def smaller_eigenvalue(first: Any, mixed: Any, second: Any, determinant: Any) -> Any:
     """The smaller eigenvalue of a positive semidefinite 2 × 2 matrix, 2 det/(tr + √(tr² − 4 det)).
 
-    tr² − 4 det = (first − second)² + 4 mixed² is a sum of squares, so nothing cancels. No equation is given, because
-    the larger eigenvalue would satisfy it too; the formula is smooth wherever the eigenvalues differ.
+    tr² − 4 det = (first − second)² + 4 mixed² is a sum of squares, so subtraction loses no digits. The quantity has no
+    `equation`, because the larger eigenvalue would satisfy it too. The formula is smooth if the eigenvalues differ.
     """
-    apart = sqrt((first - second) * (first - second) + 4 * mixed * mixed)
-    return 2 * determinant / (first + second + apart + _TINY)
+    gap = sqrt((first - second) * (first - second) + 4 * mixed * mixed)
+    return 2 * determinant / (first + second + gap + _TINY)
 
 
 def contact_path(p: AnyNumbers) -> tuple[Any, Any, Any, Any, Any]:
-    """Coefficients e, f, v, w, −c cos λ_s of the paths of the contacts, without lateral slip.
+    """Coefficients e, f, v, w, −c cos λ_s of the paths of the wheel contacts, which do not slip sideways.
 
-    ψ′ = e δ + f δ′ = (v δ + c δ′) cos λ_s/w; to the right y_rear′ = v ψ, y_front = y_rear + w ψ − c cos λ_s δ. In
-    dimensionless parameters w is 1 and v is Fr.
+    The yaw rate is ψ′ = e δ + f δ′ = (v δ + c δ′) cos λ_s/w. The contact points move to the right by y_rear, with
+    y_rear′ = v ψ, and y_front = y_rear + w ψ − c cos λ_s δ. In dimensionless parameters w is 1 and v is Fr.
     """
     T, v, w, c = tan(p["lambda_s"]), p["v"] if "v" in p else p["Fr"], p.get("w", 1), p.get("c", 0)
     cosine = 1 / sqrt(1 + T * T)

@@ -1,7 +1,7 @@
 """Controllers of bicycles: torques on lean and steer from lean, lean rate, steer and steer rate.
 
 M q″ + D q′ + K q = −G (φ, δ, φ′, δ′), q = (lean, steer), so the gains add to D and K. With a lag of the actuators,
-lag T′ + T = −G (…), and the row of each torque is multiplied by lag s + 1.
+lag T′ + T = −G (…), so the equation of each torque T is multiplied by lag s + 1.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -31,11 +31,11 @@ _TORQUES = {
     "k": "steer torque",
 }  # in the order of the rows of M, D, K
 _STATE_ORDER = ("phi", "phidot", "delta", "deltadot")
-_STEER = tuple(f"k_{x}" for x in _STATE_ORDER)
+_STEER_GAINS = tuple(f"k_{x}" for x in _STATE_ORDER)
 
 
 class _Gain(NamedTuple):
-    """A gain of a torque against a state, multiplied by the speed if it is a slope."""
+    """A gain: torque = −gain · state, or −gain · speed · state if it is a slope over the speed."""
 
     torque: str
     state: str
@@ -59,11 +59,13 @@ _GAINS = {
 }
 
 FEEDBACK = (*_GAINS, LAG)
-"""Names of [feedback], in SI."""
+"""Names of the parameters in the table [feedback], in SI."""
 
-_PASSIVE = ("v_weave", "v_capsize", "Fr_c", "v_c")
-_ABSENT = "its formula holds without a controller only; run `tmsopt speeds` for the stable speeds of this bicycle"
-_NO_PEAK = "with a lag the torque starts at 0; run `tmsopt simulate` for its peak after a push"
+_UNCONTROLLED_QUANTITIES = ("v_weave", "v_capsize", "Fr_c", "v_c")
+_ABSENT_ADVICE = (
+    "its formula holds without a controller only; run `tmsopt speeds` for the stable speeds of this bicycle"
+)
+_NO_PEAK_ADVICE = "with a lag the torque starts at 0; run `tmsopt simulate` for its peak after a push"
 _CONVENTION = (
     "A controller adds the steer torque −(k_phi φ + k_phidot φ′ + k_delta δ + k_deltadot δ′), to the right positive."
 )
@@ -75,7 +77,7 @@ NO_CONTROLLER = {
         ("torque_per_degree", "push_torque"), "there is no torque without a controller; add a table [feedback]"
     ),
 }
-"""Names unknown to a bicycle without a controller → what to write."""
+"""Names that a bicycle without a controller does not have → advice on what to write."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +86,8 @@ class ControllableBicycle:
 
     Attributes:
         model: the bicycle without a controller.
-        matrices: algebraic parameters → M, D, K for a steer angle in a unit in which they are polynomials.
-        unit: algebraic parameters and √(1 + T²) → that unit in radians, and its square.
+        matrices: algebraic parameters → M, D, K. The unit of the steer angle is chosen so that they are polynomials.
+        unit: algebraic parameters and √(1 + T²), T = tan λ_s → that unit in radians, and its square.
         speed: name of the speed in the native set.
     """
 
@@ -101,7 +103,7 @@ def native_name(name: str) -> str:
 
 
 def si_scale(name: str, p: AnyNumbers, rate: NumberFunction, torque: NumberFunction) -> Any:
-    """SI value of a parameter of [feedback] whose dimensionless value is 1."""
+    """The value in SI of a parameter of [feedback] that is 1 in dimensionless form."""
     if name == LAG:
         return 1 / rate(p)
     scale = torque(p) / rate(p) if _GAINS[name].is_rate else torque(p)
@@ -109,17 +111,21 @@ def si_scale(name: str, p: AnyNumbers, rate: NumberFunction, torque: NumberFunct
 
 
 def feedback_names(names: Iterable[str]) -> tuple[str, ...]:
-    """The names of [feedback] among `names` of either set; if there is one, all four gains of the steer torque too."""
-    given = set(names)
-    found = {n for n in FEEDBACK if n in given or native_name(n) in given}
-    return tuple(n for n in FEEDBACK if n in found or (found and n in _STEER))
+    """The names of [feedback] among `names`, SI or dimensionless; with any of them also the four steer torque gains."""
+    given_names = set(names)
+    used_names = {n for n in FEEDBACK if n in given_names or native_name(n) in given_names}
+    return tuple(n for n in FEEDBACK if n in used_names or (used_names and n in _STEER_GAINS))
 
 
 def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
-    """The bicycle with a controller that has the parameters `names`, from `feedback_names`."""
+    """The bicycle with a controller.
+
+    Args:
+        names: parameters of the controller, as `feedback_names` returns them.
+    """
     base, has_lag = bicycle.model, LAG in names
-    listed = {n: _GAINS[n] for n in names if n != LAG}
-    places = {gain.place for gain in listed.values()}
+    gains_by_name = {n: _GAINS[n] for n in names if n != LAG}
+    places = {gain.place for gain in gains_by_name.values()}
     driven = tuple(sorted({row for row, _ in places}))
     in_si = base.sets[0].rate is not None  # the native set
 
@@ -129,15 +135,16 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
     def gains(p: AnyNumbers) -> Matrix:
         """G from native parameters."""
         G: Matrix = [[0] * len(_STATES) for _ in _TORQUES]
-        for n, gain in listed.items():
+        for n, gain in gains_by_name.items():
             i, j = gain.place
             G[i][j] = G[i][j] + (p[native(n)] * p[bicycle.speed] if gain.slope else p[native(n)])
         return G
 
     def algebraic(p: AnyNumbers) -> dict[str, Any]:
-        plain, G = base.algebraic(p), gains(p)
-        own = {f"G_{i}_{j}": G[i][j] for i, j in places}
-        return {**plain, **own, "h": sqrt(1 + plain["T"] * plain["T"])} | ({LAG: p[native(LAG)]} if has_lag else {})
+        base_values, G = base.algebraic(p), gains(p)
+        gain_entries = {f"G_{i}_{j}": G[i][j] for i, j in places}
+        lag = {LAG: p[native(LAG)]} if has_lag else {}
+        return {**base_values, **gain_entries, "h": sqrt(1 + base_values["T"] * base_values["T"]), **lag}
 
     def polynomial(**values: Any) -> list[Any]:
         matrices = bicycle.matrices(values)
@@ -166,10 +173,11 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
         return M, D, K
 
     sets = tuple(_extend_set(s, names, native, feedback) for s in base.sets)
-    removed = {*_PASSIVE, *(("omega0",) if has_lag else ())}
-    kept = {name: advice for name, advice in base.absent.items() if name not in NO_CONTROLLER}
-    every = (*base.quantities, *(q for s in base.sets for q in s.quantities))
-    absent = {q.name: _ABSENT for q in every if q.name in removed} | ({"push_torque": _NO_PEAK} if has_lag else {})
+    removed_names = {*_UNCONTROLLED_QUANTITIES, *(("omega0",) if has_lag else ())}
+    base_advice = {name: advice for name, advice in base.absent.items() if name not in NO_CONTROLLER}
+    all_quantities = (*base.quantities, *(q for s in base.sets for q in s.quantities))
+    absent = {q.name: _ABSENT_ADVICE for q in all_quantities if q.name in removed_names}
+    absent |= {"push_torque": _NO_PEAK_ADVICE} if has_lag else {}
     return replace(
         base,
         title=f"{base.title} with a controller",
@@ -181,9 +189,9 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
         pencil=pencil,
         feedback=feedback,
         natural=False,
-        quantities=tuple(q for q in base.quantities if q.name not in removed),
+        quantities=tuple(q for q in base.quantities if q.name not in removed_names),
         conventions=(*base.conventions, _CONVENTION),
-        absent=kept | absent,
+        absent=base_advice | absent,
     )
 
 
@@ -194,20 +202,20 @@ def _multiply_by_lag(lag: Any, entry: list[Any]) -> list[Any]:
 
 
 def _first_order(M: Matrix, D: Matrix, K: Matrix, G: Matrix, lag: Any, driven: tuple[int, ...]) -> Matrices:
-    """I and −A for the states φ, δ, φ′, δ′ and the lagging torques."""
+    """I and −A of x′ = A x, where the states x are φ, δ, φ′, δ′ and the delayed torques."""
     (a, b), (c, d) = M
     size = a * d - b * c
     inverse = [[quotient(d, size), quotient(-b, size)], [quotient(-c, size), quotient(a, size)]]
     forces = [[*stiff, *damped] for stiff, damped in zip(K, D, strict=True)]
     zeros = [0] * len(driven)
-    minus = [[0, 0, -1, 0, *zeros], [0, 0, 0, -1, *zeros]]
-    for one, other in inverse:
-        accelerations = [one * x + other * y for x, y in zip(*forces, strict=True)]
-        minus.append([*accelerations, *(-(one, other)[row] for row in driven)])
+    minus_A = [[0, 0, -1, 0, *zeros], [0, 0, 0, -1, *zeros]]
+    for first, second in inverse:
+        accelerations = [first * x + second * y for x, y in zip(*forces, strict=True)]
+        minus_A.append([*accelerations, *(-(first, second)[row] for row in driven)])
     for row in driven:
         decay = (quotient(1, lag) if row == k else 0 for k in driven)
-        minus.append([*(quotient(g, lag) for g in G[row]), *decay])
-    return [[int(i == j) for j in range(len(minus))] for i in range(len(minus))], minus
+        minus_A.append([*(quotient(g, lag) for g in G[row]), *decay])
+    return [[int(i == j) for j in range(len(minus_A))] for i in range(len(minus_A))], minus_A
 
 
 def _extend_set(
@@ -215,24 +223,26 @@ def _extend_set(
 ) -> ParameterSet:
     """A parameter set with the gains, in SI or dimensionless."""
     if base.rate is None:
-        own = tuple(_parameter(n, "1", native(n)) for n in names)
-        return replace(base, parameters=(*base.parameters, *own))
+        gain_parameters = tuple(_parameter(n, "1", native(n)) for n in names)
+        return replace(base, parameters=(*base.parameters, *gain_parameters))
     to_native, rate, torque = base.native, base.rate, base.torque
     assert torque is not None
 
     def to_native_with_gains(p: AnyNumbers) -> dict[str, Any]:
-        own = {native(n): p[n] if native(n) == n else p[n] / si_scale(n, p, rate, torque) for n in names}
-        return {**to_native(p), **own}
+        gain_values = {native(n): p[n] if native(n) == n else p[n] / si_scale(n, p, rate, torque) for n in names}
+        return {**to_native(p), **gain_values}
 
-    own = tuple(replace(_parameter(n, _unit(n), n), counterpart="" if native(n) == n else native(n)) for n in names)
-    quantities = tuple(q for q in base.quantities if q.name not in _PASSIVE)
-    every = (*base.parameters, *own)
+    gain_parameters = tuple(
+        replace(_parameter(n, _unit(n), n), counterpart="" if native(n) == n else native(n)) for n in names
+    )
+    quantities = tuple(q for q in base.quantities if q.name not in _UNCONTROLLED_QUANTITIES)
+    all_parameters = (*base.parameters, *gain_parameters)
 
     def torques(v: AnyNumbers) -> Feedback:
-        return feedback(to_native_with_gains({p.name: v[p.name] for p in every}))
+        return feedback(to_native_with_gains({p.name: v[p.name] for p in all_parameters}))
 
     quantities += tuple(_quantities(names, torques, rate))
-    return replace(base, parameters=every, native=to_native_with_gains, quantities=quantities)
+    return replace(base, parameters=all_parameters, native=to_native_with_gains, quantities=quantities)
 
 
 def _unit(name: str) -> str:
@@ -262,10 +272,10 @@ def _quantities(names: tuple[str, ...], torques: Callable[..., Feedback], rate: 
         return gain * pi(gain) / 180
 
     def torque_after_push(v: AnyNumbers) -> Any:
-        """Torque per impulse: the rates jump by M⁻¹ (0, 1)."""
-        found = torques(v)
-        (a, b), (c, d) = found.mass
-        _, gains = found.gains
+        """Torque per impulse: the push changes the rates at once by M⁻¹ (0, 1)."""
+        feedback = torques(v)
+        (a, b), (c, d) = feedback.mass
+        _, gains = feedback.gains
         return quotient(gains[3] * a - gains[2] * b, a * d - b * c) * rate(v)
 
     yield _magnitude("torque_per_degree", "N m", "steer torque per degree of lean", r"T_\delta/\phi", per_degree)

@@ -40,15 +40,15 @@ def quantities(
         computed: name → fields with functions, which a file cannot have.
         counterparts: SI quantities by name.
     """
-    found = []
+    result = []
     for name, row in rows.items():
         fields = {"value": row.get("stands_for")} | _fields(name, row) | computed.get(name, {})
         if "positive_part" in fields:
             fields |= _positive_part(fields.pop("positive_part"))
         elif isinstance(fields["value"], str):
             fields["value"] = parse_value(fields["value"], None)
-        found.append(Quantity(name, **fields | {"counterpart": counterparts.get(fields.get("counterpart", ""))}))
-    return tuple(found)
+        result.append(Quantity(name, **fields | {"counterpart": counterparts.get(fields.get("counterpart", ""))}))
+    return tuple(result)
 
 
 def _fields(name: str, row: AnyNumbers) -> dict[str, Any]:

@@ -63,7 +63,7 @@ def to_si(p: AnyNumbers, w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) -> dict
 
     More: docs/how_to/units.md
     """
-    own = {
+    si_values = {
         "w": w,
         "v": p["Fr"] * sqrt(g * w),
         "g": g,
@@ -75,11 +75,12 @@ def to_si(p: AnyNumbers, w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) -> dict
         "x_H": p["chi_H"] * w,
         "z_H": p["zeta_H"] * w,
     }
-    return {**own, **{n: p[native_name(n)] * si_scale(n, own, _rate, _torque) for n in FEEDBACK if native_name(n) in p}}
+    gains = {n: p[native_name(n)] * si_scale(n, si_values, _rate, _torque) for n in FEEDBACK if native_name(n) in p}
+    return {**si_values, **gains}
 
 
 def _pencil(p: AnyNumbers) -> Matrices:
-    """M, V, P from tan λ_s alone: cos λ_s = 1/√(1 + tan² λ_s) on the open interval of tilts."""
+    """M, V, P from tan λ_s only, because cos λ_s = 1/√(1 + tan² λ_s) for every allowed tilt."""
     T = tan(p["lambda_s"])
     cosine = 1 / sqrt(1 + T * T)
     return matrices(**_without_tilt(p), sine=T * cosine, cosine=cosine)
@@ -107,7 +108,7 @@ _SI = ParameterSet(
 )
 _IN_SI = {q.name: q for q in (*_SI_QUANTITIES, *quantities(_TABLES["quantities"]["shown"]))}
 
-_ABSENT = {
+_ABSENT_ADVICE = {
     "trail": "skates have no trail; the distance of the front mass from the steer axis is nu_H, or u_H in SI: write "
     "'nu_H >= 0.02' or 'u_H >= 0.02'; for wheels and a trail, c, choose model = \"whipple\"",
 }
@@ -128,7 +129,7 @@ tms = Model(
     omits="two point masses on skates, without wheels, rotational inertia or trail",
     conventions=CONVENTIONS,
     sketch=TMS,
-    absent=_ABSENT | NO_CONTROLLER,
+    absent=_ABSENT_ADVICE | NO_CONTROLLER,
 )
 """The two-mass-skate bicycle."""
 

@@ -26,14 +26,14 @@ def copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: 
 
 
 def compact_copo(Fr: Any, mu: Any, chi_B: Any, chi_H: Any, zeta_B: Any, zeta_H: Any, T: Any) -> list[Any]:
-    """The same coefficients divided by −ζ_B > 0, in nine products and one quotient."""
-    behind, below = chi_H - 1, zeta_B - zeta_H
-    lever, arm = Fr * (chi_H - chi_B), Fr * below
-    gravity = T + mu * behind / zeta_B
+    """The coefficients of `copo` divided by −ζ_B > 0, computed with nine products and one quotient."""
+    front_offset, height_difference = chi_H - 1, zeta_B - zeta_H
+    lever, arm = Fr * (chi_H - chi_B), Fr * height_difference
+    gravity = T + mu * front_offset / zeta_B
     return [
-        zeta_B * (zeta_H * T - behind),
+        zeta_B * (zeta_H * T - front_offset),
         -zeta_H * lever - chi_H * arm,
-        zeta_H * gravity + zeta_B * T - behind - Fr * arm,
+        zeta_H * gravity + zeta_B * T - front_offset - Fr * arm,
         -lever,
         gravity,
     ]

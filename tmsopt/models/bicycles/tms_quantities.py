@@ -12,8 +12,8 @@ from tmsopt.records import AnyNumbers
 def _weave_condition(v: AnyNumbers) -> tuple[list[Any], Any]:
     """Terms of the numerator of Fr_c², and its denominator.
 
-    The Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² is linear in Fr² and has the factor ζ_B − ζ_H. Without this
-    factor it stays regular at ζ_B = ζ_H, where the full condition holds at any speed.
+    The Hurwitz condition a1 a2 a3 = a0 a3² + a4 a1² is linear in Fr² and has the factor ζ_B − ζ_H. The terms are
+    without this factor, because for ζ_B = ζ_H the full condition holds at any speed.
     """
     mu, chi_B, chi_H, zeta_B, zeta_H = (v[name] for name in ("mu", "chi_B", "chi_H", "zeta_B", "zeta_H"))
     lever, moment, k = chi_B - chi_H, zeta_B * chi_H - zeta_H * chi_B, chi_H - 1
@@ -28,9 +28,9 @@ def _weave_condition(v: AnyNumbers) -> tuple[list[Any], Any]:
 def _Fr_c(v: AnyNumbers) -> Any:
     terms, denominator = _weave_condition(v)
     numerator, size = sum(terms), sum(map(absolute, terms))
-    level = negligible(v["chi_B"] - v["chi_H"], absolute(v["chi_B"]) + absolute(v["chi_H"]))
-    squared = quotient(choose(negligible(numerator, size), 0, numerator), choose(level, 0, denominator))
-    return absolute(sqrt(squared))  # turns −0 into 0
+    is_same_place = negligible(v["chi_B"] - v["chi_H"], absolute(v["chi_B"]) + absolute(v["chi_H"]))
+    square = quotient(choose(negligible(numerator, size), 0, numerator), choose(is_same_place, 0, denominator))
+    return absolute(sqrt(square))  # turns −0 into 0
 
 
 def _Fr_c_equation(v: AnyNumbers, x: Any) -> Any:
@@ -39,7 +39,7 @@ def _Fr_c_equation(v: AnyNumbers, x: Any) -> Any:
 
 
 def _mass_margin(v: AnyNumbers) -> Any:
-    """Smaller eigenvalue of M, from det M = μ ν_H² ζ_B², in which nothing cancels."""
+    """Smaller eigenvalue of M, from det M = μ ν_H² ζ_B², a product that loses no digits."""
     T = tan(v["lambda_s"])
     h = sqrt(1 + T * T)
     native = {name: v[name] for name in ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H")}

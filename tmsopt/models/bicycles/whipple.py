@@ -1,7 +1,7 @@
 """The Carvallo–Whipple bicycle in SI (Meijaard et al. 2007): two wheels, rear frame and handlebar, with trail.
 
-Parameters left out are 0: without wheels, trail and moments of inertia this is the two-mass-skate bicycle, with
-the same parameters and roots.
+Parameters that a problem omits are 0. Without wheels, trail and moments of inertia this is the two-mass-skate bicycle,
+with the same parameters and roots.
 """
 
 from pkgutil import resolve_name
@@ -18,7 +18,7 @@ from tmsopt.models.tables import read_table
 from tmsopt.records import AnyNumbers
 
 _TABLES = read_table("bicycles/whipple")
-_NO_RADIUS = "a wheel without radius would turn infinitely fast"
+_RADIUS_REASON = "a wheel without radius would turn infinitely fast"
 
 _SI = ParameterSet(
     "SI",
@@ -28,7 +28,7 @@ _SI = ParameterSet(
     rate=lambda p: 1,
     root_unit="1/s",
     torque=lambda p: 1,
-    needs={"I_Ryy": ("r_R", _NO_RADIUS), "I_Fyy": ("r_F", _NO_RADIUS)},
+    needs={"I_Ryy": ("r_R", _RADIUS_REASON), "I_Fyy": ("r_F", _RADIUS_REASON)},
 )
 
 

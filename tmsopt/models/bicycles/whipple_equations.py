@@ -1,9 +1,9 @@
 """The linear Carvallo–Whipple bicycle: its matrices and its characteristic polynomial, without division.
 
-Meijaard, Papadopoulos, Ruina and Schwab (2007), appendix A, with x forward and z down from the rear contact, and two
-differences. The sums over handlebar and front wheel are about the steer axis, because a massless front assembly has no
-centre of mass. Each wheel has, besides its radius, a parameter for its spin S = I_yy/r, the angular momentum at a speed
-of 1, so that a wheel without size needs no special case.
+The equations are those of Meijaard, Papadopoulos, Ruina and Schwab (2007), appendix A, with x forward and z down from
+the rear contact, and with two differences. The sums over handlebar and front wheel are about the steer axis, because a
+front assembly without mass has no centre of mass. Each wheel has a parameter for its spin S = I_yy/r, the angular
+momentum at a speed of 1, in addition to its radius, so that a wheel without size needs no special case.
 """
 
 from typing import Any
@@ -42,8 +42,8 @@ def matrices(
 
     Args:
         S_R, S_F: spins I_yy/r of the wheels.
-        sine, cosine: of the steer axis tilt.
-        turn: cosine/w, the curvature of the path per steer angle.
+        sine, cosine: sine and cosine of the steer axis tilt.
+        turn: cosine/w, the curvature of the path for a steer angle of 1.
 
     For a steer angle in a unit k times as large, multiply `sine`, `cosine` and `turn` by k.
     """
@@ -55,7 +55,7 @@ def matrices(
     I_Txz = I_Bxz + I_Hxz - m_B * x_B * z_B - m_H * x_H * z_H + m_F * w * r_F
     I_Tzz = I_Rxx + I_Bzz + I_Hzz + I_Fxx + m_B * x_B * x_B + m_H * x_H * x_H + m_F * w * w
 
-    # The front assembly about the steer axis, which meets the ground the trail c ahead of the contact.
+    # Sums of the front assembly about the steer axis. The axis meets the ground at the distance c ahead of the contact.
     u_H = (x_H - w - c) * cosine - z_H * sine
     u_F = r_F * sine - c * cosine
     first_u = m_H * u_H + m_F * u_F
@@ -83,7 +83,7 @@ def tangent_matrices(T: Any, w: Any, **bodies: Any) -> tuple[Matrix, Matrix, Mat
     """M, C1, K0 and K2 with T = tan λ, for a steer angle in units of cos λ/w.
 
     Args:
-        bodies: the other lengths, masses, inertias and spins of `matrices`.
+        bodies: the remaining lengths, masses, inertias and spins, as in `matrices`.
     """
     return matrices(w, **bodies, sine=w * T, cosine=w, turn=1)
 
@@ -106,19 +106,19 @@ def powers_of_speed(M: Matrix, C1: Matrix, K0: Matrix, K2: Matrix) -> tuple[Any,
     )
 
 
-def carvallo_whipple(v: Any, g: Any, **others: Any) -> list[Any]:
-    """Coefficients a0 … a4 of det(M s² + v C1 s + g K0 + v² K2) · (w/cos λ)², with T = tan λ, by ``+ - *`` alone.
+def carvallo_whipple(v: Any, g: Any, **other_parameters: Any) -> list[Any]:
+    """Coefficients a0 … a4 of det(M s² + v C1 s + g K0 + v² K2) · (w/cos λ)², with T = tan λ, by ``+ - *`` only.
 
     The factor comes from a steer angle in units of cos λ/w, in which the equations are polynomials in T and w.
 
     Args:
-        others: the other algebraic parameters, those of `tangent_matrices`.
+        other_parameters: the arguments of `tangent_matrices`.
     """
-    b = powers_of_speed(*tangent_matrices(**others))
+    b = powers_of_speed(*tangent_matrices(**other_parameters))
     v2 = v * v
     return [b[0], v * b[1], g * b[2] + v2 * b[3], v * (g * b[4] + v2 * b[5]), g * (g * b[6] + v2 * b[7])]
 
 
 def _mixed_determinant(A: Matrix, B: Matrix) -> Any:
-    """The part of det(A + B) that is linear in A and in B."""
+    """The terms of det(A + B) that contain one entry of A and one of B."""
     return A[0][0] * B[1][1] + A[1][1] * B[0][0] - A[0][1] * B[1][0] - A[1][0] * B[0][1]

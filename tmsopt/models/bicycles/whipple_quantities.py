@@ -11,14 +11,14 @@ from tmsopt.models.bicycles.whipple_equations import matrices, powers_of_speed, 
 from tmsopt.models.model import Matrix
 from tmsopt.records import AnyNumbers
 
-_LARGE = 1e300  # above every relevant v²/g
+_LARGE = 1e300  # stands for "no root"; greater than every v²/g of interest
 
 IN_MATRICES = tuple(signature(matrices).parameters)[:-3]
 """Algebraic parameters except T, v and g: lengths, masses, inertias and spins."""
 
 
 def spin(I_yy: Any, r: Any) -> Any:
-    """Angular momentum I_yy/r of a rolling wheel at a speed of 1; 0 for a wheel without inertia, at any radius.
+    """Angular momentum I_yy/r of a rolling wheel at a speed of 1; 0 for a wheel without inertia and any radius.
 
     I_yy ≤ m r², so the spin vanishes with the radius. A wheel with inertia but without radius would turn infinitely
     fast, so its spin is nan.
@@ -57,7 +57,7 @@ def canonical(p: AnyNumbers) -> tuple[Matrix, Matrix, Matrix, Matrix]:
 
 
 def _sine_cosine(p: AnyNumbers) -> tuple[Any, Any]:
-    """From tan λ_s alone: cos λ_s = 1/√(1 + tan² λ_s), because tilts lie in (−π/2, π/2)."""
+    """Sine and cosine of λ_s from tan λ_s: cos λ_s = 1/√(1 + tan² λ_s) is positive, because |λ_s| < π/2."""
     T = tan(p["lambda_s"])
     cosine = 1 / sqrt(1 + T * T)
     return T * cosine, cosine
@@ -85,24 +85,24 @@ def _v_weave(v: AnyNumbers) -> Any:
     imaginary if ω² = a3/a1 = g (b4 + y b5)/b1 is positive; otherwise it is ± a real number.
     """
     b = _powers(v)
-    second = b[5] * (b[1] * b[3] - b[0] * b[5])
-    first = b[1] * (b[2] * b[5] + b[3] * b[4]) - 2 * b[0] * b[4] * b[5] - b[7] * b[1] * b[1]
-    last = b[4] * (b[1] * b[2] - b[0] * b[4]) - b[6] * b[1] * b[1]
-    return sqrt(v["g"] * _least_weave(*_quadratic_roots(second, first, last), b))
+    quadratic = b[5] * (b[1] * b[3] - b[0] * b[5])
+    linear = b[1] * (b[2] * b[5] + b[3] * b[4]) - 2 * b[0] * b[4] * b[5] - b[7] * b[1] * b[1]
+    constant = b[4] * (b[1] * b[2] - b[0] * b[4]) - b[6] * b[1] * b[1]
+    return sqrt(v["g"] * _least_weave(*_quadratic_roots(quadratic, linear, constant), b))
 
 
 def _quadratic_roots(a: Any, b: Any, c: Any) -> tuple[Any, Any]:
-    """Roots of a y² + b y + c without cancellation; nan for a root that does not exist. One exists if a = 0."""
+    """Roots of a y² + b y + c, without loss of digits; nan for a root that does not exist. For a = 0, one exists."""
     radical = sqrt(b * b - 4 * a * c)
-    far = -(b + choose(less(0, b), radical, -radical)) / 2
-    return quotient(far, a), quotient(c, far)
+    half_sum = -(b + choose(less(0, b), radical, -radical)) / 2
+    return quotient(half_sum, a), quotient(c, half_sum)
 
 
-def _least_weave(one: Any, other: Any, b: tuple[Any, ...]) -> Any:
-    """The least y that is positive and has a positive ω²; nan if there is none."""
-    one, other = (choose(both(less(0, y), less(0, (b[4] + y * b[5]) * b[1])), y, _LARGE) for y in (one, other))
-    found = least(one, other)
-    return choose(less(found, _LARGE), found, math.nan)
+def _least_weave(first: Any, second: Any, b: tuple[Any, ...]) -> Any:
+    """The smaller of two roots y, of those that are positive and give a positive ω²; nan if there is none."""
+    first, second = (choose(both(less(0, y), less(0, (b[4] + y * b[5]) * b[1])), y, _LARGE) for y in (first, second))
+    smaller_root = least(first, second)
+    return choose(less(smaller_root, _LARGE), smaller_root, math.nan)
 
 
 def _fork_offset(v: AnyNumbers) -> Any:
@@ -116,7 +116,7 @@ def _u_H(v: AnyNumbers) -> Any:
 
 
 def _mass_margin(v: AnyNumbers) -> Any:
-    """Smaller eigenvalue of M."""
+    """The smaller eigenvalue of M."""
     (first, mixed), (_, second) = canonical(v)[0]
     return smaller_eigenvalue(first, mixed, second, first * second - mixed * mixed)
 

@@ -1,4 +1,4 @@
-"""A system of the user's own with a controller: u = −G y of y = C x, in M q″ + D q′ + K q = B u or x′ = A x + B u."""
+"""A system of the user's own with a controller u = −G y, y = C x, in M q″ + D q′ + K q = B u or x′ = A x + B u."""
 
 from collections.abc import Mapping
 
@@ -36,22 +36,26 @@ def check_loop(shapes: Mapping[str, tuple[int, int]]) -> None:
         what = "one per state" if system == "A" else "the coordinates, then their rates"
         raise Unfit("C", f"has {columns} columns; accepted: {states}, {what}")
     if shapes["G"] != (inputs, measured):
-        found = " × ".join(map(str, shapes["G"]))
+        size = " × ".join(map(str, shapes["G"]))
         raise Unfit(
             "G",
-            f"is {found}; accepted: {inputs} × {measured}, a row per column of B and a column per "
+            f"is {size}; accepted: {inputs} × {measured}, a row per column of B and a column per "
             + ("row of C" if "C" in shapes else "state"),
         )
 
 
 def close_loop(matrices: Mapping[str, Matrix]) -> dict[str, Matrix]:
-    """The matrices with the controller: B G C is added to K and D, or subtracted from A."""
-    own = {key: rows for key, rows in matrices.items() if key not in LOOP}
+    """The matrices of the system with its controller: B G C is added to K and D, or subtracted from A."""
+    system = {key: rows for key, rows in matrices.items() if key not in LOOP}
     if "B" not in matrices:
-        return own
+        return system
     B, G, C = (np.array(matrices.get(key, 0), dtype=object) for key in ("B", "G", "C"))
     gain = B @ G @ C if "C" in matrices else B @ G
-    if "A" in own:
-        return {"A": (own["A"] - gain).tolist()}
-    n = len(own["M"])
-    return {"M": own["M"], "D": (own.get("D", 0) + gain[:, n:]).tolist(), "K": (own["K"] + gain[:, :n]).tolist()}
+    if "A" in system:
+        return {"A": (system["A"] - gain).tolist()}
+    n = len(system["M"])
+    return {
+        "M": system["M"],
+        "D": (system.get("D", 0) + gain[:, n:]).tolist(),
+        "K": (system["K"] + gain[:, :n]).tolist(),
+    }

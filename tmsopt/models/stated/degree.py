@@ -1,4 +1,4 @@
-"""Degrees of expressions, checked before exact numbers are computed, which grow with the degree."""
+"""Degrees of expressions. They are checked before the exact values, whose numbers of digits grow with the degree."""
 
 import math
 import operator
@@ -15,14 +15,14 @@ LARGEST_EXPONENT = 1023
 """Largest exponent of a power: 2**1024 is not a double."""
 
 LARGEST_DEGREE = 10_000
-"""Largest degree of an expanded expression. At a design of doubles its value has some million bits at most."""
+"""Largest degree of an expanded expression, so that its exact value for doubles has at most some million bits."""
 
 
 class DegreeTooHigh(ValueError):
     """An expression is too large or not finite; the message says why.
 
     Attributes:
-        part: the part at fault, once known.
+        part: the part of the expression that is too large; None until the parser sets it.
     """
 
     part: Any = None
@@ -30,54 +30,57 @@ class DegreeTooHigh(ValueError):
 
 @dataclass(frozen=True)
 class Degree:
-    """Degrees of an expression as a quotient of polynomials; `+ - * / **` act as on the quotients.
+    """Degrees of an expression as a quotient of two polynomials; `+ - * / **` give the degrees of their results.
 
     Attributes:
-        over, under: upper bounds of the degrees of numerator and denominator.
+        numerator, denominator: upper bounds of the degrees of the two polynomials.
         number: the value of a constant expression.
 
     Raises:
         DegreeTooHigh: if a number is not finite, or an exponent or a degree is too large.
     """
 
-    over: int = 1
-    under: int = 0
+    numerator: int = 1
+    denominator: int = 0
     number: float | None = None
 
     def __post_init__(self) -> None:
         if self.number is not None and not math.isfinite(self.number):
             raise DegreeTooHigh(f"is {self.number:g}; accepted: parts with a finite value")
-        if max(self.over, self.under) > LARGEST_DEGREE:
-            found = max(self.over, self.under)
-            size = f"{found}" if found < 10**18 else f"about 1e{len(str(found)) - 1}"
+        if max(self.numerator, self.denominator) > LARGEST_DEGREE:
+            degree = max(self.numerator, self.denominator)
+            size = f"{degree}" if degree < 10**18 else f"about 1e{len(str(degree)) - 1}"
             raise DegreeTooHigh(f"has the degree {size} when multiplied out; accepted: up to {LARGEST_DEGREE}")
 
     def __add__(self, other: "Degree") -> "Degree":
-        return Degree(max(self.over + other.under, other.over + self.under), self.under + other.under)
+        return Degree(
+            max(self.numerator + other.denominator, other.numerator + self.denominator),
+            self.denominator + other.denominator,
+        )
 
     def __mul__(self, other: "Degree") -> "Degree":
-        return Degree(self.over + other.over, self.under + other.under)
+        return Degree(self.numerator + other.numerator, self.denominator + other.denominator)
 
     def __truediv__(self, other: "Degree") -> "Degree":
         if other.number == 0:
             raise DegreeTooHigh("divides by 0; accepted: parts with a finite value")
-        return Degree(self.over + other.under, self.under + other.over)
+        return Degree(self.numerator + other.denominator, self.denominator + other.numerator)
 
     def __pow__(self, other: "Degree") -> "Degree":
         n = other.number
         if n is None:
-            return Degree()  # computed by logarithms, in numbers of fixed size
+            return Degree()  # a power with a variable exponent is computed by logarithms, in numbers of fixed size
         if abs(n) > LARGEST_EXPONENT:
             accepted = (
                 f"from -{LARGEST_EXPONENT} to {LARGEST_EXPONENT}, because 2**{LARGEST_EXPONENT + 1} is not a double"
             )
             raise DegreeTooHigh(f"has the exponent {n:.17g}; accepted: {accepted}")
-        over, under = (self.over, self.under) if n >= 0 else (self.under, self.over)
-        return Degree(math.ceil(abs(n) * over), math.ceil(abs(n) * under))
+        numerator, denominator = (self.numerator, self.denominator) if n >= 0 else (self.denominator, self.numerator)
+        return Degree(math.ceil(abs(n) * numerator), math.ceil(abs(n) * denominator))
 
 
 def _operation(join: Callable[..., Degree], name: str) -> Callable[..., Degree]:
-    """An operation on degrees, which is computed if all operands are numbers."""
+    """An operation on degrees; if all operands are numbers, its result also contains the number."""
 
     def operation(*operands: Degree) -> Degree:
         joined = join(*operands)
@@ -99,11 +102,11 @@ _OPERATIONS: Mapping[str, Callable[..., Degree]] = {
     "pow": operator.pow,
     **dict.fromkeys(
         ("neg", "sqrt", "abs", "min", "max"),
-        lambda *operands: Degree(max(x.over for x in operands), max(x.under for x in operands)),
+        lambda *operands: Degree(max(x.numerator for x in operands), max(x.denominator for x in operands)),
     ),
     **dict.fromkeys(
         ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan"), lambda *operands: Degree()
-    ),  # of a fixed size
+    ),  # their values have a fixed number of digits
 }
 
 
@@ -119,23 +122,23 @@ DEGREES = Kind({name: _operation(join, name) for name, join in _OPERATIONS.items
 
 
 def first_fault(formula: Formula) -> tuple[int, str] | None:
-    """The first output that cannot be computed, and why.
+    """The index of the first output that cannot be computed, and the reason; None if there is none.
 
     Degrees do not accumulate here, because in formulas built by a program, such as a matrix inverse, most terms cancel.
     `tmsopt.models.expression` checks the degrees of texts.
     """
-    found: list[Degree | str] = []
+    results: list[Degree | str] = []
     for step in formula.steps:
-        operands = [found[k] for k in step.operands]
-        wrong = next((o for o in operands if isinstance(o, str)), "")
+        operands = [results[k] for k in step.operands]
+        reason = next((o for o in operands if isinstance(o, str)), "")
         degree = Degree()
         if step.op not in (*DEGREES.operations, CONSTANT, INPUT):
             functions = "sin cos tan asin acos atan sqrt exp log fabs fmin fmax"
-            wrong = wrong or f"uses {step.op}; accepted: + - * / ** and {functions}"
-        elif step.op != INPUT and not wrong:
+            reason = reason or f"uses {step.op}; accepted: + - * / ** and {functions}"
+        elif step.op != INPUT and not reason:
             try:
                 degree = DEGREES.constant(step.value) if step.op == CONSTANT else DEGREES.operations[step.op](*operands)
             except DegreeTooHigh as error:
-                wrong = str(error)
-        found.append(wrong or (degree if degree.number is not None else Degree()))
-    return next(((k, text) for k, o in enumerate(formula.outputs) if isinstance(text := found[o], str)), None)
+                reason = str(error)
+        results.append(reason or (degree if degree.number is not None else Degree()))
+    return next(((k, text) for k, o in enumerate(formula.outputs) if isinstance(text := results[o], str)), None)

@@ -11,11 +11,11 @@ from tmsopt.models.stated.pairs import Pair, pair
 from tmsopt.roots.polynomial import characteristic_polynomial, product, quadratic_pencil
 
 IMAGINARY = "H, imaginary part"
-"""Key of the imaginary part of H; ``H`` is then the real part."""
+"""Key of the imaginary part of a complex H; the key ``H`` then has the real part."""
 
 
 def user_key(key: str) -> str:
-    """The user's key for the key of a part of a matrix."""
+    """The key that the user wrote: ``H`` for both parts of H."""
     return key.partition(",")[0]
 
 
@@ -38,8 +38,8 @@ def polynomial(kind: str, blocks: dict[str, Matrix], carrier: float = 0.0) -> li
 def _real_polynomial(R: Matrix, J: Matrix, carrier: float) -> list[Any]:
     """|det(s + i (H + carrier))|² for real s; its roots are −i (ω + carrier) and their conjugates."""
     rows, S = range(len(R)), _add_carrier(R, carrier)
-    found = [pair(x) for x in characteristic_polynomial([[Pair(J[i][j], -S[i][j]) for j in rows] for i in rows])]
-    re, im = [x.re for x in found], [x.im for x in found]
+    coefficients = [pair(x) for x in characteristic_polynomial([[Pair(J[i][j], -S[i][j]) for j in rows] for i in rows])]
+    re, im = [x.re for x in coefficients], [x.im for x in coefficients]
     return [a + b for a, b in zip(product(re, re), product(im, im), strict=True)]
 
 

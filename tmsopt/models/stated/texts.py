@@ -16,9 +16,9 @@ from tmsopt.models.stated.pairs import IMAGINARY_UNIT, PAIRS, entry_pair, pair, 
 from tmsopt.records import Table
 
 MOST_QUANTITIES = 500
-"""More would take seconds to parse."""
+"""Greatest number of quantities; more would take seconds to parse."""
 
-_CYCLES = 8  # most cycles of quantities that are listed
+_MAX_CYCLES = 8  # greatest number of reported cycles of quantities that use one another
 _UNIT_NAMES = ("i", "j")
 
 
@@ -53,14 +53,14 @@ class Texts:
 
     Attributes:
         fault: called with a message and its place: ``M``, or ``quantities`` and a name.
-        known: quantities that are not texts, and those already built.
+        quantity_nodes: quantities that were given as nodes, and those already built from texts.
         kind: kind of numbers for entries.
-        constants: names with a fixed value in it.
-        names: names in the texts so far.
+        constants: names with a fixed value of that kind, such as the imaginary unit.
+        names: names in the texts that were read until now.
     """
 
     fault: Callable[..., None]
-    known: dict[str, Any]
+    quantity_nodes: dict[str, Any]
     kind: Kind = NODES
     constants: Mapping[str, Any] = Table()
     names: dict[str, None] = field(default_factory=dict)
@@ -79,11 +79,11 @@ class Texts:
             self.fault(f"found {len(texts)} quantities; accepted: up to {MOST_QUANTITIES}", "quantities")
             texts = {}
         for name, text in texts.items():
-            if why := name_fault(name, bool(self.constants)):
-                self.fault(f"'{name}' {why}; give the quantity a name of its own", "quantities", str(name))
+            if reason := name_fault(name, bool(self.constants)):
+                self.fault(f"'{name}' {reason}; give the quantity a name of its own", "quantities", str(name))
             else:
                 self.expressions[name] = self._parse(text, ("quantities", name), "")
-        for _ in range(_CYCLES):
+        for _ in range(_MAX_CYCLES):
             uses = {n: [m for m in e.names if m in self.expressions] if e else [] for n, e in self.expressions.items()}
             try:
                 self._order = tuple(TopologicalSorter(uses).static_order())
@@ -97,22 +97,22 @@ class Texts:
         self.expressions = dict.fromkeys(self.expressions)  # the remaining cycles are not listed
 
     def quantity(self, name: str) -> Any:
-        """A quantity as a node in parameters; every quantity is built once."""
-        if name not in self.known:
-            for each in self._order or self.expressions:
-                expression = self.expressions[each]
-                self.known[each], self._degrees[each] = (
-                    self._build(expression, ("quantities", each), "") if expression else (0, Degree())
+        """A quantity as a node that depends on parameters only; the first call builds all quantities."""
+        if name not in self.quantity_nodes:
+            for quantity_name in self._order or self.expressions:
+                expression = self.expressions[quantity_name]
+                self.quantity_nodes[quantity_name], self._degrees[quantity_name] = (
+                    self._build(expression, ("quantities", quantity_name), "") if expression else (0, Degree())
                 )
-        return self.known[name]
+        return self.quantity_nodes[name]
 
     def _build(
         self, expression: Expression, key: tuple[str, ...], where: str, kind: Kind = NODES
     ) -> tuple[Any, Degree]:
-        """An expression as a number of the kind, and its degree with its quantities expanded."""
+        """An expression as a number of the kind, and its degree in the parameters."""
         values = {} if kind is NODES else dict(self.constants)
         for name in (n for n in expression.names if n not in values):
-            derived = name in self.expressions or name in self.known
+            derived = name in self.expressions or name in self.quantity_nodes
             self.names[name] = None
             values[name] = self.quantity(name) if derived else symbol(name)
         try:
@@ -130,26 +130,28 @@ class Texts:
             self.fault(f"{where}{error}", *key)
             return None
         for name in expression.names:
-            if (why := name_fault(name, bool(self.constants))) and name not in self.constants:
-                self.fault(f"{where}'{name}' {why}; give the parameter another name", *key)
+            if (reason := name_fault(name, bool(self.constants))) and name not in self.constants:
+                self.fault(f"{where}'{name}' {reason}; give the parameter another name", *key)
                 return None
         return expression
 
 
 def place(key: str, i: int, j: int) -> str:
-    """The place of an entry in words."""
+    """The place of an entry, such as ``row 1, column 2``, for messages."""
     return f"entry {j}" if key == "coefficients" else f"row {i}, column {j}"
 
 
 def parse_entries(
     matrices: Mapping[str, Matrix], derived: Mapping[Any, Any], fault: Callable[..., None]
 ) -> tuple[dict[str, Matrix], dict[Any, Any]]:
-    """Matrices and quantities with nodes in place of texts; every entry of a complex H becomes a pair."""
+    """Matrices and quantities with nodes instead of texts; each entry of a complex H becomes a pair (re, im)."""
     in_text = {n: x for n, x in derived.items() if isinstance(x, str)}
-    known, of_H = {n: x for n, x in derived.items() if n not in in_text}, "H" in matrices
-    texts = Texts(fault, dict(known))
+    given_nodes, of_H = {n: x for n, x in derived.items() if n not in in_text}, "H" in matrices
+    texts = Texts(fault, dict(given_nodes))
     if of_H:
-        texts = Texts(lambda message, *key: fault(restore_literals(message), *key), dict(known), PAIRS, IMAGINARY_UNIT)
+        texts = Texts(
+            lambda message, *key: fault(restore_literals(message), *key), dict(given_nodes), PAIRS, IMAGINARY_UNIT
+        )
     texts.read_quantities(in_text)
 
     def entry(x: Any, n: str, i: int, j: int) -> Any:
@@ -168,4 +170,4 @@ def parse_entries(
         n: [[entry(x, n, i, j) for j, x in enumerate(row, start=1)] for i, row in enumerate(rows, start=1)]
         for n, rows in matrices.items()
     }
-    return parsed, {n: texts.quantity(n) for n in derived if n in known or n in texts.expressions}
+    return parsed, {n: texts.quantity(n) for n in derived if n in given_nodes or n in texts.expressions}

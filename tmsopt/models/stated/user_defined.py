@@ -41,11 +41,11 @@ from tmsopt.records import AnyNumbers
 _ACCEPTED = "accepted: finite numbers, expressions in quotes, and SX expressions"
 _FINITE = "accepted: finite numbers, and expressions of them"
 
-_MOST = dict.fromkeys("MDKH", 6) | dict.fromkeys(("A", "coefficients", *LOOP), 12)
-"""Largest size of a matrix, and largest degree."""
+_MAX_SIZE = dict.fromkeys("MDKH", 6) | dict.fromkeys(("A", "coefficients", *LOOP), 12)
+"""Key → largest number of rows and columns of a matrix; for coefficients, largest degree."""
 
 _Shape = tuple[str, int, int]  # key, rows and columns of a matrix
-_SAMPLES = 24  # designs at which a leading coefficient must vanish before it is examined
+_SAMPLES = 24  # designs at which a leading coefficient must be 0 before it is examined exactly
 
 
 def from_matrices(
@@ -84,18 +84,18 @@ def from_matrices(
 
     More: docs/tutorials/own_system.md
     """
-    every = {"A": A, "M": M, "D": D, "K": K, "B": B, "C": C, "G": G}
-    given = {n: value for n, value in every.items() if value is not None}
-    if "A" in given and not given.keys().isdisjoint("MDK"):
+    all_matrices = {"A": A, "M": M, "D": D, "K": K, "B": B, "C": C, "G": G}
+    given_matrices = {n: value for n, value in all_matrices.items() if value is not None}
+    if "A" in given_matrices and not given_matrices.keys().isdisjoint("MDK"):
         raise Unfit("A", "is given together with M, D or K; give either A, or M and K (and D)")
-    for n in () if "A" in given else ("M", "K"):
-        if n not in given:
+    for n in () if "A" in given_matrices else ("M", "K"):
+        if n not in given_matrices:
             raise Unfit(n, "is missing; give M and K (and D), or A, or coefficients")
-    matrices = {n: _read_matrix(n, value) for n, value in given.items()}
-    most = len(masses := matrices.get("M", []))
+    matrices = {n: _read_matrix(n, value) for n, value in given_matrices.items()}
+    rows_of_M = len(masses := matrices.get("M", []))
     for n in ("D", "K"):
-        if (size := len(matrices.get(n, masses))) != most:
-            raise Unfit(n, f"is {size} × {size}, but M is {most} × {most}; accepted: matrices of one size")
+        if (size := len(matrices.get(n, masses))) != rows_of_M:
+            raise Unfit(n, f"is {size} × {size}, but M is {rows_of_M} × {rows_of_M}; accepted: matrices of one size")
     check_loop({n: (len(rows), len(rows[0])) for n, rows in matrices.items()})
     return _build_model("matrices", name, matrices, quantities)
 
@@ -113,11 +113,12 @@ def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: An
 
     More: docs/tutorials/own_system.md
     """
-    given, most = _entries(coefficients), _MOST["coefficients"] + 1
-    row = None if given is None or any(_entries(x) is not None for x in given) else given
-    if row is None or not 2 <= len(row) <= most:
-        found = "no list" if row is None else f"{len(row)} entries"
-        raise Unfit("coefficients", f"found {found}; accepted: a list of 2 to {most} coefficients, descending")
+    entries, max_entries = _entries(coefficients), _MAX_SIZE["coefficients"] + 1
+    row = None if entries is None or any(_entries(x) is not None for x in entries) else entries
+    if row is None or not 2 <= len(row) <= max_entries:
+        description = "no list" if row is None else f"{len(row)} entries"
+        accepted = f"a list of 2 to {max_entries} coefficients, descending"
+        raise Unfit("coefficients", f"found {description}; accepted: {accepted}")
     return _build_model("coefficients", name, {"coefficients": [row]}, quantities)
 
 
@@ -159,28 +160,28 @@ def _entries(value: Any) -> list[Any] | None:
 
 
 def _read_matrix(key: str, value: Any) -> Matrix:
-    """The rows of a matrix; those of a controller may have any length, the others are square."""
+    """The rows of a matrix. The matrices of a controller may have any shape, the others must be square."""
     if isinstance(value, ca.SX | ca.DM):
         rows: list[Any] = [ca.horzsplit(row) for row in ca.vertsplit(value)]
     elif (entries := _entries(value)) is None or (isinstance(value, np.ndarray) and value.ndim != 2):
-        found = f"an array of {value.ndim} dimensions" if isinstance(value, np.ndarray) else type(value).__name__
-        raise Unfit(key, f"found {found}; accepted: a matrix as nested lists, a NumPy array, SX or DM")
+        description = f"an array of {value.ndim} dimensions" if isinstance(value, np.ndarray) else type(value).__name__
+        raise Unfit(key, f"found {description}; accepted: a matrix as nested lists, a NumPy array, SX or DM")
     else:
         rows = [_entries(row) for row in entries]
-    sizes, most = [None if row is None else len(row) for row in rows], _MOST[key]
+    sizes, max_size = [None if row is None else len(row) for row in rows], _MAX_SIZE[key]
     size, accepted = len(rows), "as many rows as entries in each"
     if key in LOOP:
         size, accepted = next(iter(sizes), 0) or 0, "rows of equal length"
-    if not size or any(found != size for found in sizes):
-        shape = " + ".join("?" if found is None else str(found) for found in sizes)
+    if not size or any(length != size for length in sizes):
+        shape = " + ".join("?" if length is None else str(length) for length in sizes)
         raise Unfit(key, f"found rows of {shape or 'no'} entries; accepted: {accepted}")
-    if max(size, len(rows)) > most:
-        raise Unfit(key, f"is {len(rows)} × {size}; accepted: up to {most} × {most}")
+    if max(size, len(rows)) > max_size:
+        raise Unfit(key, f"is {len(rows)} × {size}; accepted: up to {max_size} × {max_size}")
     return rows
 
 
 def _build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> Model:
-    """The model of a system; equal systems give the same object."""
+    """The model of a system. Two equal systems give the same object."""
     key, of_H = next(iter(matrices)), kind == "hamiltonian"
     if not isinstance(name, str) or not name.strip() or not name.isprintable():
         raise Unfit("name", f"found {name!r}; accepted: a text of one line")
@@ -202,61 +203,62 @@ def _build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: 
     } | {("quantities", str(n)): x for n, x in derived.items()}
     inputs = ca.symvar(ca.vertcat(ca.SX(0, 1), *(x for x in by_place.values() if isinstance(x, ca.SX))))
     symbols = Counter(x.name() for x in inputs)
-    entries = {at: _node(user_key(at[0]), at[1], x) for at, x in by_place.items()}
-    names = formula(entries[at] for at in sort_places(kind, entries)).names
+    entries = {position: _node(user_key(position[0]), position[1], x) for position, x in by_place.items()}
+    names = formula(entries[position] for position in sort_places(kind, entries)).names
     if duplicates := [n for n, count in symbols.items() if count > 1]:
         raise Unfit(key, f"has two symbols named {min(duplicates)}; make one and use it everywhere")
     if not names:
         raise Unfit(key, "names no parameter, so there is nothing to design; write a name in an entry, such as 'k'")
     for n in names:
-        if why := name_fault(n, of_H):
-            raise Unfit(key, f"has a symbol named {n!r}, which {why}; choose another name")
+        if reason := name_fault(n, of_H):
+            raise Unfit(key, f"has a symbol named {n!r}, which {reason}; choose another name")
     for n in derived:
-        if why := "is the name of a parameter" if n in names else name_fault(n, of_H):
-            raise Unfit("quantities", f"{n!r} {why}; choose another name for the quantity")
+        if reason := "is the name of a parameter" if n in names else name_fault(n, of_H):
+            raise Unfit("quantities", f"{n!r} {reason}; choose another name for the quantity")
     shapes = tuple((n, len(rows), len(rows[0])) for n, rows in matrices.items())
-    stated = formula(entries.values(), names)
-    if wrong := first_fault(stated):
-        (key, where), why = list(by_place)[wrong[0]], wrong[1]
-        raise Unfit(user_key(key), f"{where}: {why}")
-    return _rebuilt(kind, name.strip(), shapes, tuple(derived), stated)
+    entry_formula = formula(entries.values(), names)
+    if fault := first_fault(entry_formula):
+        (key, where), reason = list(by_place)[fault[0]], fault[1]
+        raise Unfit(user_key(key), f"{where}: {reason}")
+    return _build_from_data(kind, name.strip(), shapes, tuple(derived), entry_formula)
 
 
 @lru_cache(maxsize=64)
-def _rebuilt(
+def _build_from_data(
     kind: str,
     name: str,
     shapes: tuple[_Shape, ...],
     derived: tuple[str, ...],
-    stated: Formula,
+    entry_formula: Formula,
     carrier: float = 0.0,
 ) -> Model:
-    """A model from plain data; each process has one object for each model."""
-    names = stated.names
-    entries = fold(stated, {n: symbol(n) for n in names}, NODES)
-    rest = iter(entries)
-    blocks = close_loop(_split(rest, shapes))
-    every = polynomial(kind, blocks, carrier)
-    degree = len(every) - 1
-    lost = _leading_zeros(formula(every, names))
-    lost = lost and _count_identical_zeros(kind, blocks, names, lost)
-    if lost == degree:
+    """A model from plain data. Each process has only one object for each model."""
+    names = entry_formula.names
+    entries = fold(entry_formula, {n: symbol(n) for n in names}, NODES)
+    remaining_entries = iter(entries)
+    blocks = close_loop(_split(remaining_entries, shapes))
+    all_coefficients = polynomial(kind, blocks, carrier)
+    degree = len(all_coefficients) - 1
+    zero_count = _leading_zeros(formula(all_coefficients, names))
+    zero_count = zero_count and _count_identical_zeros(kind, blocks, names, zero_count)
+    if zero_count == degree:
         raise Unfit(shapes[0][0], "gives a polynomial without s, which has no root")
-    coefficients, quantities = formula(every[lost:], names), zip(derived, rest, strict=True)
+    coefficients = formula(all_coefficients[zero_count:], names)
+    quantities = zip(derived, remaining_entries, strict=True)
     parameters = tuple(Parameter(n, "1", "parameter", latex(n)) for n in names)
-    plain = (kind, name, shapes, derived, stated)
+    arguments = (kind, name, shapes, derived, entry_formula)
     model = Model(
         name=name,
         title=name,
-        degree=degree - lost,
+        degree=degree - zero_count,
         sets=(ParameterSet("stated", parameters, native=dict),),
         algebraic=dict,
-        polynomial=lambda **given: values(coefficients, given),
+        polynomial=lambda **numbers: values(coefficients, numbers),
         quantities=tuple(Quantity(n, "1", "quantity", latex(n), _function(x, names)) for n, x in quantities),
         pencil=None if kind == "coefficients" else _matrices(pencil(blocks, carrier), names),
-        origin=(_rebuilt, (*plain, carrier) if carrier else plain),
-        statement=_statement(stated, shapes, derived),
-        numbers=tuple(number_text(x) for x in stated.constants if getattr(x, "denominator", 0) != 1),
+        origin=(_build_from_data, (*arguments, carrier) if carrier else arguments),
+        statement=_statement(entry_formula, shapes, derived),
+        numbers=tuple(number_text(x) for x in entry_formula.constants if getattr(x, "denominator", 0) != 1),
     )
     if kind != "hamiltonian":
         return model
@@ -264,60 +266,61 @@ def _rebuilt(
         model,
         carrier,
         frequency_bounds(entries[: len(entries) - len(derived)]),
-        lambda c: _rebuilt(*plain, *([c] if c else [])),
+        lambda c: _build_from_data(*arguments, *([c] if c else [])),
         _matrices(pencil(blocks), names),
     )
 
 
 def _function(x: Any, names: Sequence[str]) -> Callable[[AnyNumbers], Any]:
-    own = formula([x], names)
-    return lambda given: values(own, given)[0]
+    output = formula([x], names)
+    return lambda numbers: values(output, numbers)[0]
 
 
 def _matrices(rows: Sequence[Matrix], names: Sequence[str]) -> Callable[[AnyNumbers], Matrices]:
     """A function from named numbers to matrices, for matrices of nodes."""
-    n, own = len(rows[0]), formula((x for P in rows for row in P for x in row), names)
+    n, entry_formula = len(rows[0]), formula((x for P in rows for row in P for x in row), names)
     shapes = [(str(k), n, n) for k in range(len(rows))]
-    return lambda given: tuple(_split(iter(values(own, given)), shapes).values())
+    return lambda numbers: tuple(_split(iter(values(entry_formula, numbers)), shapes).values())
 
 
 def _count_identical_zeros(kind: str, blocks: Mapping[str, Matrix], names: Sequence[str], leading: int) -> int:
-    """How many of the first `leading` coefficients are identically 0, counted up to the first that is not."""
-    own = dict(blocks)
-    for n in ("D", "K")[max(leading - 1, 0) :] if "M" in own else ():  # without effect on these coefficients
-        own[n] = [[0] * len(own["M"]) for _ in own["M"]]
-    coefficients = formula(polynomial(kind, own)[:leading], names)
+    """The number of coefficients before the first one that is not identically 0; at most `leading`."""
+    relevant_blocks = dict(blocks)
+    # The leading coefficients do not depend on these matrices.
+    for n in ("D", "K")[max(leading - 1, 0) :] if "M" in relevant_blocks else ():
+        relevant_blocks[n] = [[0] * len(relevant_blocks["M"]) for _ in relevant_blocks["M"]]
+    coefficients = formula(polynomial(kind, relevant_blocks)[:leading], names)
     field = Field(coefficients)
     try:
         row = fold(coefficients, field.inputs, field.kind)
         return next((k for k, c in enumerate(row) if not field.is_zero(c)), leading)
-    except (ZeroDivisionError, UnsupportedOperation):  # too large to decide
+    except (ZeroDivisionError, UnsupportedOperation):  # the formulas are too large to decide
         return 0
 
 
-def _statement(stated: Formula, shapes: tuple[_Shape, ...], derived: Sequence[str]) -> dict[str, Any]:
-    """Plain data that identify a model, with every digit of its numbers."""
-    texts, shared = spell_formula(stated)
-    rest = iter(texts)
-    matrices, quantities = _split(rest, shapes), dict(zip(derived, rest, strict=True))
+def _statement(entry_formula: Formula, shapes: tuple[_Shape, ...], derived: Sequence[str]) -> dict[str, Any]:
+    """Plain data that identify a model, with all digits of its numbers."""
+    texts, shared = spell_formula(entry_formula)
+    remaining_texts = iter(texts)
+    matrices, quantities = _split(remaining_texts, shapes), dict(zip(derived, remaining_texts, strict=True))
     if IMAGINARY in matrices:
         rows = zip(matrices["H"], matrices.pop(IMAGINARY), strict=True)
         matrices["H"] = [list(map(complex_text, *row)) for row in rows]
-    return {"parameters": list(stated.names), **matrices, "quantities": quantities, "shared": shared}
+    return {"parameters": list(entry_formula.names), **matrices, "quantities": quantities, "shared": shared}
 
 
 def _split(entries: Iterator[Any], shapes: Iterable[_Shape]) -> dict[str, Matrix]:
-    """Matrices with rows and columns of the given numbers, filled with entries one after the other."""
+    """Key → matrix of the given shape; the entries fill the rows of the matrices in order."""
     return {n: [list(islice(entries, columns)) for _ in range(rows)] for n, rows, columns in shapes}
 
 
 def _leading_zeros(coefficients: Formula) -> int:
     """Number of leading coefficients that may be 0 for all parameters, e.g. if M is singular.
 
-    A ball of 60 digits at one of 24 designs, of many sizes and signs, shows that a coefficient is not.
+    A coefficient is not 0 if, at one of 24 designs of many sizes and signs, its value to 60 digits is not 0.
     """
     names, rng = coefficients.names, np.random.default_rng(0)
-    found: list[int] = []
+    zero_counts: list[int] = []
     with flint.ctx.workdps(DIGITS):
         for i in range(_SAMPLES):
             # A third of the designs has both signs; sizes are near 1 in the first half, then from 1e-6 to 1e6.
@@ -326,10 +329,10 @@ def _leading_zeros(coefficients: Formula) -> int:
             balls = [flint.arb(c) for c in fold(coefficients, dict(zip(names, design.tolist(), strict=True)), BALLS)]
             zeros = [c.is_finite() and c.contains(0) for c in balls[:-1]]
             first = zeros.index(False) if False in zeros else len(zeros)
-            found += [first] if balls[first].is_finite() else []
-            if 0 in found:
+            zero_counts += [first] if balls[first].is_finite() else []
+            if 0 in zero_counts:
                 break
-    return min(found, default=0)
+    return min(zero_counts, default=0)
 
 
 def _unfit(message: str, key: str, *name: str) -> NoReturn:
@@ -337,7 +340,7 @@ def _unfit(message: str, key: str, *name: str) -> NoReturn:
 
 
 def _node(key: str, where: Any, value: Any) -> Any:
-    """An entry as a node; a text unchanged.
+    """An entry as a node; a text is returned unchanged.
 
     Raises:
         Unfit: if it is not a finite number or a scalar SX.

@@ -10,56 +10,58 @@ from tmsopt.models.tables import read_table
 from tmsopt.models.user_spectrum import public_names
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES, root_names
 
-_NEAR = 0.7  # similarity of a misspelt name; below it, meanings are searched first
+_MIN_SIMILARITY = 0.7  # if no name is at least so similar to an unknown name, the meanings are searched first
 
 _EXAMPLES = (
     (1.0, 0.5, 2.0),
     (-1.0, -2.0, -0.5),
     (0.5, 0.2, 1.0),
-)  # value, least, greatest; the first valid one is used
+)  # (value, least, greatest); the first example in the range of a parameter is used
 
 
-def vocabulary(model: Model, of: ParameterSet) -> dict[str, Parameter | Quantity]:
+def vocabulary(model: Model, parameter_set: ParameterSet) -> dict[str, Parameter | Quantity]:
     """Every name that an expression may use, in the order of the documentation."""
-    native = () if of is model.sets[0] else model.sets[0].parameters
+    native = () if parameter_set is model.sets[0] else model.sets[0].parameters
     words = {0: "constant coefficient", 1: "coefficient of s"}
-    known: dict[str, Parameter | Quantity] = {}
+    entries: dict[str, Parameter | Quantity] = {}
     for k, n in zip(range(model.degree, -1, -1), model.coefficient_names(), strict=True):
         meaning = f"{words.get(k, f'coefficient of s^{k}')} in the characteristic polynomial"
-        known[n] = Quantity(n, "", meaning, f"a_{{{model.degree - k}}}", itemgetter(n))
-    derived = (*model.quantities, *of.quantities, *ROOT_QUANTITIES, NO_RADIUS)
-    known |= {p.name: p for p in (*native, *of.parameters)} | {q.name: q for q in derived}
+        entries[n] = Quantity(n, "", meaning, f"a_{{{model.degree - k}}}", itemgetter(n))
+    derived = (*model.quantities, *parameter_set.quantities, *ROOT_QUANTITIES, NO_RADIUS)
+    entries |= {p.name: p for p in (*native, *parameter_set.parameters)} | {q.name: q for q in derived}
     if model.carrier is not None:
-        known["abscissa"] = replace(ROOT_QUANTITIES[0], meaning="largest Im omega, gain less loss")
-    return {name: known[name] for name in (*of.names, *public_names(model, of), *root_names(model))}
+        entries["abscissa"] = replace(ROOT_QUANTITIES[0], meaning="largest Im omega, gain less loss")
+    names = (*parameter_set.names, *public_names(model, parameter_set), *root_names(model))
+    return {name: entries[name] for name in names}
 
 
-def suggest_name(name: str, model: Model, of: ParameterSet, accepted: Iterable[str] | None = None) -> str:
-    """Suggest a name for an unknown one, by spelling or by meaning."""
+def suggest_name(name: str, model: Model, parameter_set: ParameterSet, accepted: Iterable[str] | None = None) -> str:
+    """Suggest a name instead of an unknown name, by its spelling or by its meaning."""
     if name in model.absent:
         return model.absent[name]
     if name == "s" and accepted is None:
         return f"s is the eigenvalue: write abscissa for the largest Re s, {ANGULAR_FREQUENCY} for the largest |Im s|"
     if meaning := _suggest_model(name, model):
         return meaning
-    known = vocabulary(model, of)
-    names = list(known if accepted is None else accepted)
-    if not nearest(name.lower(), [n.lower() for n in names], _NEAR):
+    entries = vocabulary(model, parameter_set)
+    names = list(entries if accepted is None else accepted)
+    if not nearest(name.lower(), [n.lower() for n in names], _MIN_SIMILARITY):
         words = name.lower().replace("_", " ")
         for n in names:
-            meaning = known[n].meaning.lower()
+            meaning = entries[n].meaning.lower()
             if len(words) > 3 and (words in meaning or words.replace(" ", "") in meaning.replace(" ", "")):
-                return f"write {n} ({known[n].meaning}); accepted: {' '.join(names)}"
+                return f"write {n} ({entries[n].meaning}); accepted: {' '.join(names)}"
     return suggest(name, names)
 
 
 def _suggest_model(name: str, model: Model) -> str:
-    """Suggest the bicycle model that has a name; empty if none has."""
-    for other in MODELS.values() if model.name in MODELS else ():
-        known = {p.name: p.meaning for s in other.sets for p in s.parameters}
-        known |= {q.name: q.meaning for q in (*other.quantities, *(q for s in other.sets for q in s.quantities))}
-        if other.name != model.name and name in known:
-            return f'model = "{other.name}" has it ({known[name]}), {model.name} does not'
+    """Suggest another bicycle model, if it has the name; else empty."""
+    for candidate in MODELS.values() if model.name in MODELS else ():
+        meanings = {p.name: p.meaning for s in candidate.sets for p in s.parameters}
+        quantities = (*candidate.quantities, *(q for s in candidate.sets for q in s.quantities))
+        meanings |= {q.name: q.meaning for q in quantities}
+        if candidate.name != model.name and name in meanings:
+            return f'model = "{candidate.name}" has it ({meanings[name]}), {model.name} does not'
     return ""
 
 
@@ -70,7 +72,7 @@ def example_of(parameter: Parameter) -> tuple[str, str]:
 
 
 def suggest_key(key: str, accepted: Mapping[str, object], section: str = "file") -> str:
-    """Suggest a key for an unknown one of a section or of the file itself."""
-    meant = read_table("advice")["keys"][section].get(key.lower())
-    written = f"write {f'[{meant}]' if section == 'file' else meant}; " if meant else ""
-    return written + suggest(key, accepted)
+    """Suggest a key instead of an unknown key of a section, or of the file itself."""
+    replacement = read_table("advice")["keys"][section].get(key.lower())
+    hint = f"write {f'[{replacement}]' if section == 'file' else replacement}; " if replacement else ""
+    return hint + suggest(key, accepted)

@@ -14,7 +14,7 @@ from tmsopt.records import Numbers, Table, plain
 DIGITS = 5
 """Significant digits of a suggested limit."""
 
-_LEFT = 1e-11  # a moved limit below this share of the old one is 0 up to rounding
+_NEGLIGIBLE = 1e-11  # a new limit below this share of the old limit counts as 0, because it may come from rounding
 
 
 @dataclass(frozen=True)
@@ -23,13 +23,14 @@ class Relaxation:
 
     Attributes:
         parameters: a design that is feasible with the relaxed limits.
-        amounts: limit → how far it is relaxed, in its own units; signed for an equality.
-        conflict: limits that no design was found to meet together, and ends of ranges beyond which the others are met.
-        alone: limit → how far it must move if it is the only one; confirmed by solving again.
-        irreducible: whether dropping any one limit of the conflict gives a design that meets the others, while a full
-            search found none for all; never if limits on the roots let a0 vanish, since narrow regions may hide there.
-        remedies: sets of limits as a file would write them, smallest change first. Each is sufficient: the problem was
-            solved again with it, and the answer is stable if stability is wanted. Empty if none was found.
+        amounts: limit → how far it is relaxed, in its own units; the amount has a sign for an equality.
+        conflict: limits that no design was found to meet together. An end of a range is one of them if a design beyond
+            it meets the other limits.
+        alone: limit → how far it must be relaxed if no other limit is; confirmed by solving again.
+        irreducible: whether, without any one limit of the conflict, a design meets the others, although a full search
+            found none that meets all. Always false if limits on the roots allow a0 = 0, where narrow regions may hide.
+        remedies: sets of limits as a file would write them, the smallest change first. Each set is sufficient: the
+            problem was solved again with it, and the answer is stable if stability is wanted. Empty if none was found.
     """
 
     parameters: Table[float] = Table()
@@ -53,7 +54,7 @@ class RequiredValue:
         value: the nearest value with such a design; nan if none was found.
         most: whether it is the greatest such value; otherwise it is the least.
         looked: the range that was searched.
-        design: every parameter of that design; empty if none was found.
+        design: every parameter of the design at this value; empty if none was found.
         shown: the value rounded to the feasible side; the problem was solved again there.
     """
 
@@ -92,36 +93,37 @@ def move_limits(problem: Posed, amounts: Numbers, digits: int = DIGITS) -> dict[
     return {name: _move_limit(problem, name, amount, digits) for name, amount in amounts.items()}
 
 
-def replace_limits(problem: Posed, written: Mapping[str, str]) -> Posed:
+def replace_limits(problem: Posed, limit_texts: Mapping[str, str]) -> Posed:
     """The problem with other limits, written as by `move_limits`.
 
     Raises:
         InputError: for an end outside the physical range of its parameter.
     """
     ends: dict[str, Any] = dict(problem.free)
-    for name, text in written.items():
+    for name, text in limit_texts.items():
         parameter, _, end = name.rpartition(".")
         if name not in problem.constraints:
-            (low, high), new = ends[parameter], text if unit_of(problem, name).text else float(text)
-            ends[parameter] = (low, new) if end == "max" else (new, high)
-    kept = {name: written.get(name, text) for name, text in problem.constraints.items()}
-    return replace(problem.problem, constraints=kept, free=ends, start={}).posed
+            (low, high), end_value = ends[parameter], text if unit_of(problem, name).text else float(text)
+            ends[parameter] = (low, end_value) if end == "max" else (end_value, high)
+    constraints = {name: limit_texts.get(name, text) for name, text in problem.constraints.items()}
+    return replace(problem.problem, constraints=constraints, free=ends, start={}).posed
 
 
 def _move_limit(problem: Posed, name: str, amount: float, digits: int) -> str:
     if name not in problem.constraints:
         parameter, _, end = name.rpartition(".")
-        up, unit = end == "max", unit_of(problem, name)
-        new = round_outwards((problem.free[parameter][up] + (amount if up else -amount)) / unit.one, up, digits)
-        return f"{new:.{DIGITS}g} {unit.text}".rstrip()
+        is_upper, unit = end == "max", unit_of(problem, name)
+        end_value = problem.free[parameter][is_upper] + (amount if is_upper else -amount)
+        new_limit = round_outwards(end_value / unit.one, is_upper, digits)
+        return f"{new_limit:.{DIGITS}g} {unit.text}".rstrip()
     text = problem.constraints[name]
     left, sign, right = written_sides(text)
     limit = split_limit(text)
     if limit is None:
-        more = round_outwards(abs(amount), True, digits)
-        return f"{left} {sign} {right} {'-' if sign == '>=' or amount < 0 else '+'} {more:.{DIGITS}g}"
+        increase = round_outwards(abs(amount), True, digits)
+        return f"{left} {sign} {right} {'-' if sign == '>=' or amount < 0 else '+'} {increase:.{DIGITS}g}"
     change = -amount if (sign == ">=") == bool(limit.before) else amount
-    new, left_of_it = limit.value + change, _LEFT * abs(limit.value)
+    new_limit, negligible = limit.value + change, _NEGLIGIBLE * abs(limit.value)
     return limit.replace_number(
-        f"{round_outwards(new, change > 0, digits) if abs(new) > left_of_it else 0.0:.{DIGITS}g}"
+        f"{round_outwards(new_limit, change > 0, digits) if abs(new_limit) > negligible else 0.0:.{DIGITS}g}"
     )

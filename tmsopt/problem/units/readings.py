@@ -8,16 +8,16 @@ from tmsopt.models import ParameterSet
 from tmsopt.records import AnyNumbers
 
 Reading = float | tuple[float, ...]
-"""A number, or one per root; nan if undefined."""
+"""A number, or one number for each root; nan if undefined."""
 
 _READ_IN = {"m": ("mm", 1000, 1), "m/s": ("km/h", 18, 5), "rad": ("deg", 180, None)}
-"""SI unit → unit to read it in, factor and divisor; None for π."""
+"""SI unit → unit of the reading, factor and divisor; the divisor None means π."""
 
 _TIMES = ("decay_rate", "decay_time", "frequency")
-"""Quantities that are readings already."""
+"""Quantities that are not converted, because they already are readings."""
 
 READ_DIGITS = 15
-"""Digits of a converted reading, so that 15 km/h reads 15 again despite rounding."""
+"""Digits of a converted reading; rounding to them makes 15 km/h read as 15 again."""
 
 
 def convert_exactly(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str, int]:
@@ -39,11 +39,11 @@ def convert_to_reading(value: float, unit: str) -> tuple[float, str]:
 
 
 def decay_time(abscissa: Any, rate: Any) -> Any:
-    """Seconds in which the slowest part of a disturbance falls to 1/e; nan unless it falls.
+    """Seconds in which the slowest part of a disturbance decays to 1/e; nan if it does not decay.
 
     Args:
         abscissa: largest real part of the roots, dimensionless.
-        rate: a dimensionless rate of 1 in 1/s (`ParameterSet.rate`).
+        rate: `ParameterSet.rate`, the value in 1/s of a dimensionless rate of 1.
     """
     return 1 / (-abscissa * rate) if abscissa < 0 else math.nan
 
@@ -54,25 +54,26 @@ def frequencies(roots: Iterable[Any], rate: Any, pi: Any = math.pi) -> tuple[Any
 
 
 def readings(
-    of: ParameterSet,
+    parameter_set: ParameterSet,
     parameters: AnyNumbers,
     quantities: AnyNumbers,
     abscissa: Any,
     roots: Iterable[Any],
     pi: Any = math.pi,
 ) -> Iterator[tuple[str, Any, int]]:
-    """Times, frequencies and everything with a unit, named with the unit: ``v_kmh``, ``x_B_mm``.
+    """Times, frequencies, and all numbers with a unit; the name ends with the unit: ``v_kmh``, ``x_B_mm``.
 
     Yields:
         Name, number of any kind, and the decimal digits to round it to (0: none). Nothing for a set without seconds.
     """
-    if of.rate is None:
+    if parameter_set.rate is None:
         return
-    rate = of.rate(parameters)
+    rate = parameter_set.rate(parameters)
     yield "decay_time_s", decay_time(abscissa, rate), 0
     yield "growth_time_s", decay_time(-abscissa, rate), 0
     yield "frequencies_Hz", frequencies(roots, rate, pi), 0
-    units = {p.name: p.unit for p in of.parameters} | {q.name: q.unit for q in of.quantities if q.name not in _TIMES}
+    units = {p.name: p.unit for p in parameter_set.parameters}
+    units |= {q.name: q.unit for q in parameter_set.quantities if q.name not in _TIMES}
     for name in (n for n, unit in units.items() if unit != "1"):
         value = parameters[name] if name in parameters else quantities[name]
         read, unit, digits = convert_exactly(value, units[name], pi)

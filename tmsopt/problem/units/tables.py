@@ -13,47 +13,49 @@ from tmsopt.problem.units.text import LONGEST, parse_exact_quantity
 from tmsopt.records import AnyNumbers
 
 TABLES = ("free", "fixed", "start", "scenarios", "tolerances", "weights")
-"""Tables of a problem that hold numbers; the first unit typed for a parameter is kept."""
+"""Tables of a problem that contain numbers. A parameter has the first unit that was typed for it, in this order."""
 
 Typed = dict[str, dict[float, str]]
 """Parameter → double → the exact number that was typed, if the double's decimal differs."""
 
 
-def read_numbers(tables: AnyNumbers, of: ParameterSet) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
+def read_numbers(
+    tables: AnyNumbers, parameter_set: ParameterSet
+) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
     """Convert texts such as "25 cm" in the tables of a problem to numbers.
 
     Args:
         tables: the tables named in `TABLES`, of numbers and texts.
 
     Returns:
-        The tables, the units as typed, the exact numbers as typed, and the faults.
+        The tables in numbers, the typed units by parameter, the exact numbers that were typed, and the faults.
     """
     units: dict[str, str] = {}
     typed: Typed = {}
     faults: list[Fault] = []
 
     def number(value: Any, table: str, name: str, *end: str) -> Any:
-        if name not in of.names or not isinstance(value, str | Fraction | int) or isinstance(value, bool):
+        if name not in parameter_set.names or not isinstance(value, str | Fraction | int) or isinstance(value, bool):
             return value
-        sizes, unit = table in ("tolerances", "weights"), of[name].unit
-        if unit == "1" and sizes:
-            unit = of[name].multiple_of or unit  # 5 mm is 0.005 of a wheelbase of 1 m
+        is_size, unit = table in ("tolerances", "weights"), parameter_set[name].unit
+        if unit == "1" and is_size:
+            unit = parameter_set[name].multiple_of or unit  # 5 mm is 0.005 of a wheelbase of 1 m
         try:
-            found: Any
+            result: Any
             if isinstance(value, str):
-                found, written, exact = parse_exact_quantity(value, unit)
+                result, written, exact = parse_exact_quantity(value, unit)
             else:
-                found, written, exact = value, "", Exact.from_fraction(Fraction(value))
-            if not sizes and exact and exact.fraction != decimal(float(found)):
-                typed.setdefault(name, {})[float(found)] = str(exact)
+                result, written, exact = value, "", Exact.from_fraction(Fraction(value))
+            if not is_size and exact and exact.fraction != decimal(float(result)):
+                typed.setdefault(name, {})[float(result)] = str(exact)
         except OverflowError:  # an integer too large for a double
             return value
         except ValueError as error:
             faults.append(Fault(f"{error}{_suggest_text(value)}", (table, name, *end)))
             return value
-        if written and not sizes:
+        if written and not is_size:
             units.setdefault(name, written)
-        return found
+        return result
 
     def read_table(table: str, key: str) -> Iterator[tuple[str, Any]]:
         for name, value in tables[table].items():
@@ -69,8 +71,8 @@ def read_numbers(tables: AnyNumbers, of: ParameterSet) -> tuple[dict[str, Any], 
                 yield name, number(value, key, name, *(["start"] if table == "start" else []))
 
     keys = dict.fromkeys(("fixed", "free", "start"), "parameters")
-    found = {t: dict(read_table(t, keys.get(t, t))) if isinstance(tables[t], Mapping) else tables[t] for t in TABLES}
-    return found, units, typed, faults
+    results = {t: dict(read_table(t, keys.get(t, t))) if isinstance(tables[t], Mapping) else tables[t] for t in TABLES}
+    return results, units, typed, faults
 
 
 def _suggest_text(text: object) -> str:

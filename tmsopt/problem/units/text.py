@@ -1,4 +1,4 @@
-"""Parses text such as "40 cm", "1/3 m" or "8/3" as a number in the parameter's own unit."""
+"""Parses a text such as "40 cm", "1/3 m" or "8/3" as a number in the unit of its parameter."""
 
 import math
 import re
@@ -12,21 +12,21 @@ from tmsopt.models.tables import read_table
 from tmsopt.records import Numbers
 
 LONGEST = 80
-"""Characters of a number with its unit."""
+"""Greatest number of characters of a number with its unit."""
 
-_LARGEST_DENOMINATOR = 10**6  # of a factor between units such as 5/18
-_ROUNDED = 4e-16  # relative error of a factor in double precision
+_LARGEST_DENOMINATOR = 10**6  # of an exact factor between two units, such as 5/18
+_ROUNDING = 4e-16  # relative error of a factor in double precision
 _DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"(?P<number>(?>{_DECIMAL}|pi\b|[a-z]+\(|[-+](?!\s*[-+])|[*/()\s])*+)(?P<unit>.*)", re.A | re.S)
 _POWER = r"(?: ?(?:\*\*|\^) ?-?\d)?"
 _UNIT = re.compile(rf"[A-Za-zµμ°%]+{_POWER}(?:(?: ?[*/] ?| )[A-Za-zµμ°%]+{_POWER})*", re.ASCII)
-"""Names with one-digit powers, joined by * / or one blank. A text matches in one way at most, so matching is fast."""
+"""Names with one-digit powers, joined by * / or one blank. Matching is fast: a text matches in only one way."""
 
 _TWO_PARAMETERS = "write its parts as two parameters, kr + 1j*ki in H"
 
 _UNITS = read_table("units")
 USUAL: Mapping[str, Numbers] = _UNITS["usual"]
-"""Unit → other common unit → factor to the first, without loading pint."""
+"""Unit → another common unit → factor to the first unit. For these units pint is not loaded."""
 
 
 def parse_quantity(text: str, unit: str) -> float:
@@ -46,7 +46,7 @@ def _is_complex(text: str) -> bool:
 
 
 def parse_exact_quantity(text: str, unit: str) -> tuple[float, str, Exact | None]:  # noqa: PLR0912 - one for each fault
-    """The number in `unit`, the unit as written, and the exact number (None without an exact factor of the units).
+    """The number in `unit`, the unit as written, and the exact number (None if the factor of the units is not exact).
 
     Raises:
         ValueError: with the text found and what is accepted.
@@ -64,45 +64,45 @@ def parse_exact_quantity(text: str, unit: str) -> tuple[float, str, Exact | None
     if not number:
         raise ValueError(f"found '{text}', not a number{'' if unit == '1' else ' with a unit'}; {accepted}")
     try:
-        found = constant(number)
+        exact_number = constant(number)
     except ValueError as error:
         raise ValueError(f"found '{text}', no number: {str(error).partition('; accepted')[0]}; {accepted}") from None
     if not written and unit != "1":
         raise ValueError(f"found '{text}', a number in quotes without a unit; {accepted}")
     if not written:
-        return float(found), "", found
+        return float(exact_number), "", exact_number
     if unit == "1":
         raise ValueError(f"found '{text}', but the parameter is dimensionless; {accepted}")
     written = " ".join(written.replace("²", "^2").replace("³", "^3").replace("·", "*").split())
     if not _UNIT.fullmatch(written):
         raise ValueError(f"found the unit '{written}', which does not read as a unit; {accepted}")
-    one = _known_factor(written.replace("°", "deg"), unit)
-    if one is None:
+    factor = _known_factor(written.replace("°", "deg"), unit)
+    if factor is None:
         raise ValueError(f"found the unit '{written}', which is not known or not a unit of {unit}; {accepted}")
-    share, exact = _exact_factor(one), None
-    if share is not None:
-        exact = found.times(share)
+    exact_factor, exact = _exact_factor(factor), None
+    if exact_factor is not None:
+        exact = exact_number.times(exact_factor)
         value = float(exact)  # correctly rounded: 70 cm is 0.7 m
     else:  # an angle
-        value = float(found) * one
-        if one == USUAL["rad"]["deg"]:
-            exact = found.to_radians()
-    if not math.isfinite(value) or (value == 0) != (float(found) == 0):
+        value = float(exact_number) * factor
+        if factor == USUAL["rad"]["deg"]:
+            exact = exact_number.to_radians()
+    if not math.isfinite(value) or (value == 0) != (float(exact_number) == 0):
         raise ValueError(f"found '{text}', a number beyond double precision; {accepted}")
     return value, written, exact
 
 
 def unit_factor(written: str, unit: str) -> float:
     """The factor from a valid unit to `unit`; the nearest double if it is a fraction."""
-    found = _known_factor(written.replace("°", "deg"), unit)
-    assert found is not None, written
-    return float(_exact_factor(found) or found)
+    factor = _known_factor(written.replace("°", "deg"), unit)
+    assert factor is not None, written
+    return float(_exact_factor(factor) or factor)
 
 
-def _exact_factor(one: float) -> Fraction | None:
-    """The fraction that a factor is, up to rounding; None for an irrational one."""
-    share = Fraction(one).limit_denominator(_LARGEST_DENOMINATOR)
-    return None if abs(share - Fraction(one)) > _ROUNDED * share else share
+def _exact_factor(factor: float) -> Fraction | None:
+    """The fraction that a factor is up to rounding; None for an irrational factor."""
+    fraction = Fraction(factor).limit_denominator(_LARGEST_DENOMINATOR)
+    return None if abs(fraction - Fraction(factor)) > _ROUNDING * fraction else fraction
 
 
 @cache
@@ -115,13 +115,13 @@ def pint_factor(written: str, unit: str) -> float | None:
     """The factor from a unit that pint knows to `unit`; None if they do not match."""
     registry = _registry()
     try:
-        # Angles have no dimension in pint, so compare their powers by name.
-        found = registry.parse_units(written)
-        powers = dict(registry.Quantity(1.0, found).to_base_units().unit_items())
+        # Angles have no dimension in pint, so their powers are compared by name.
+        pint_unit = registry.parse_units(written)
+        powers = dict(registry.Quantity(1.0, pint_unit).to_base_units().unit_items())
         if powers.get("radian", 0) != {"rad": 1}.get(unit, -int(unit.endswith("/rad"))):
             return None
-        quantity = registry.Quantity(2.0, found).to(unit)
-        offset = registry.Quantity(0.0, found).to(unit)
+        quantity = registry.Quantity(2.0, pint_unit).to(unit)
+        offset = registry.Quantity(0.0, pint_unit).to(unit)
     except Exception:  # pint raises AssertionError, tokenizer and attribute errors on malformed text
         return None
     return float(quantity.magnitude) / 2 if offset.magnitude == 0 else None
@@ -129,6 +129,6 @@ def pint_factor(written: str, unit: str) -> float | None:
 
 @cache
 def _registry() -> Any:
-    import pint  # takes a third of a second, so only for uncommon units
+    import pint  # this takes a third of a second, so it is done for uncommon units only
 
     return pint.UnitRegistry()

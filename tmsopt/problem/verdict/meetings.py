@@ -1,4 +1,8 @@
-"""Finds the eigenvectors of multiple roots, by ranks of the model's matrices."""
+"""Finds the number of eigenvectors of multiple roots, from ranks of the model's matrices.
+
+At a multiple root several roots meet. If it has several eigenvectors the roots cross; with one eigenvector it is an
+exceptional point (EP).
+"""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
@@ -14,25 +18,29 @@ from tmsopt.roots import Pattern, Root, jordan
 from tmsopt.roots.jordan import equilibrate
 from tmsopt.roots.patterns.structure import fit_unknowns
 
-_RANK = 1e-10  # relative singular value that counts as 0
-_CLOSE = 1e-3  # singular values that may vanish near the design; those of a double root are at most about √1e-10
-_REACH = 3e-5  # greatest distance of a crossing from the design, as a share of the box
+_RANK_TOLERANCE = 1e-10  # a relative singular value below this counts as 0
+# Singular values below this may be 0 at a design near by; those of a double root are at most about √1e-10.
+_NEARLY_SINGULAR = 1e-3
+_MAX_DISTANCE = 3e-5  # greatest distance of a crossing from the design, as a share of the box
 _STEP, _STEPS = 1e-6, 6  # difference step as a share of the box; number of Gauss–Newton steps
-_VANISHED = 1e-12  # a block this small, relative to the terms of the matrices, vanishes
-_NEAR = 1e-6  # relative distance within which two roots are the same
-_UNIT = 1e-3  # least unit for scaling the matrices at a root, as a share of the largest root
+_ZERO_BLOCK = 1e-12  # a block of the matrix that is smaller, relative to the terms of the matrices, counts as 0
+_SAME_ROOT = 1e-6  # relative distance within which two roots are the same
+_MIN_UNIT = 1e-3  # least unit for scaling the matrices at a root, as a share of the largest root
 
 
 def meetings(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
-    """The multiple roots among the roots of a design's polynomial, rightmost first, as users read them."""
-    found: list[MultipleRoot] = []
+    """The multiple roots among the roots of a design's polynomial, converted to those of the user's system.
+
+    The rightmost root comes first.
+    """
+    multiple_roots: list[MultipleRoot] = []
     of_H = problem.model.carrier is not None
     for root in roots:
         if root.multiplicity > 1 and (root.im < 0 if of_H else root.im >= 0):
             (user_root,) = user_roots(problem.model, [root])
             meeting = _find_eigenvectors(problem, parameters, root, user_root, roots)
-            found += [meeting] if of_H or not root.im else [meeting, replace(meeting, im=-root.im)]
-    return tuple(sorted(found, key=lambda m: (-m.re, -m.im)))
+            multiple_roots += [meeting] if of_H or not root.im else [meeting, replace(meeting, im=-root.im)]
+    return tuple(sorted(multiple_roots, key=lambda m: (-m.re, -m.im)))
 
 
 def is_crossing(problem: Posed, pattern: Pattern, parameters: Numbers) -> bool:
@@ -66,17 +74,17 @@ def every_meeting(
     problem: Posed, parameters: Numbers, roots: Sequence[Root], violated: Collection[str]
 ) -> tuple[MultipleRoot, ...]:
     """The multiple roots of a solution: first those of its pattern, unless it is violated, then the others."""
-    shown, pattern = meetings(problem, parameters, roots), problem.pattern
-    lost = any(name in violated for name in problem.located)
-    located = located_meetings(problem, pattern, parameters) if pattern is not None and not lost else ()
-    ours = [m for m in shown if any(_is_near(m, other) for other in located)]
-    rest = [m for m in located if not any(_is_near(m, other) for other in shown)]
-    return (*ours, *rest, *(m for m in shown if m not in ours))
+    root_meetings, pattern = meetings(problem, parameters, roots), problem.pattern
+    is_violated = any(name in violated for name in problem.located)
+    located = located_meetings(problem, pattern, parameters) if pattern is not None and not is_violated else ()
+    pattern_meetings = [m for m in root_meetings if any(_is_near(m, other) for other in located)]
+    further_meetings = [m for m in located if not any(_is_near(m, other) for other in root_meetings)]
+    return (*pattern_meetings, *further_meetings, *(m for m in root_meetings if m not in pattern_meetings))
 
 
-def _is_near(one: MultipleRoot, other: MultipleRoot) -> bool:
-    a, b = _number(one), _number(other)
-    return abs(a - b) <= _NEAR * (abs(a) + abs(b) or 1.0)
+def _is_near(root: MultipleRoot, other: MultipleRoot) -> bool:
+    a, b = _number(root), _number(other)
+    return abs(a - b) <= _SAME_ROOT * (abs(a) + abs(b) or 1.0)
 
 
 def _number(root: Root | MultipleRoot) -> complex:
@@ -84,11 +92,11 @@ def _number(root: Root | MultipleRoot) -> complex:
 
 
 def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Numbers) -> dict[str, float]:
-    """The parameters near a design where its located roots cross, more accurate than from coefficients."""
+    """The parameters near a design at which its located roots cross, more accurate than from the coefficients."""
     roots = _located_roots(problem, pattern, parameters)
     root = max(roots, key=lambda r: r.multiplicity)
-    found, _ = _find_crossing(problem, parameters, _number(root), root.multiplicity, _unit(root, roots))
-    return {n: min(max(found[n], low), high) for n, (low, high) in problem.free.items()}
+    crossing, _ = _find_crossing(problem, parameters, _number(root), root.multiplicity, _unit(root, roots))
+    return {n: min(max(crossing[n], low), high) for n, (low, high) in problem.free.items()}
 
 
 def _find_eigenvectors(
@@ -98,23 +106,24 @@ def _find_eigenvectors(
     if pencil is None:
         return MultipleRoot(user_root.re, user_root.im, k, None, k)
     unit = _unit(root, roots)
-    at, s = _find_crossing(problem, parameters, _number(root), k, unit)
-    matrices = pencil(problem.parameter_set.native({n: flint.arb(x) for n, x in at.items()}))
-    found = jordan(matrices, flint.acb(s.real, s.imag), k, _RANK, unit)
-    partial = found.partial or (k - found.geometric + 1,)
-    return MultipleRoot(user_root.re, user_root.im, k, found.geometric, partial[0])
+    design, s = _find_crossing(problem, parameters, _number(root), k, unit)
+    matrices = pencil(problem.parameter_set.native({n: flint.arb(x) for n, x in design.items()}))
+    chains = jordan(matrices, flint.acb(s.real, s.imag), k, _RANK_TOLERANCE, unit)
+    partial = chains.partial or (k - chains.geometric + 1,)
+    return MultipleRoot(user_root.re, user_root.im, k, chains.geometric, partial[0])
 
 
 def _unit(root: Root, roots: Sequence[Root]) -> float:
     """The unit of a root for scaling the matrices."""
-    return max(abs(_number(root)), _UNIT * max(abs(_number(r)) for r in roots)) or 1.0
+    return max(abs(_number(root)), _MIN_UNIT * max(abs(_number(r)) for r in roots)) or 1.0
 
 
 def _find_crossing(problem: Posed, parameters: Numbers, s: complex, k: int, unit: float) -> tuple[Numbers, complex]:
     """The crossing near a design and its root; the design itself if there is none nearby.
 
-    Coefficients determine a crossing to half of their digits only, so the design may be 1e-5 away from it. At the
-    crossing the block of L(s) of the least singular values vanishes, which is a regular equation in the parameters.
+    Coefficients determine a crossing with half of their digits only, so the design may be 1e-5 away from it. L(s) is
+    the matrix polynomial. At the crossing its block of the smallest singular values is 0, which is a regular equation
+    for the parameters.
     """
     free = [n for n, (low, high) in problem.free.items() if high > low]
     start = np.array([*(float(parameters[n]) for n in free), s.real, s.imag])
@@ -126,36 +135,36 @@ def _find_crossing(problem: Posed, parameters: Numbers, s: complex, k: int, unit
         return {**parameters, **dict(zip(free, x.tolist(), strict=False))}
 
     def scaled_matrix(x: Array) -> Complex:
-        found = np.polyval(_matrices(problem, design_at(x)), complex(*x[-2:]))
-        return np.asarray(scale * found, dtype=complex)
+        matrix = np.polyval(_matrices(problem, design_at(x)), complex(*x[-2:]))
+        return np.asarray(scale * matrix, dtype=complex)
 
     for count in range(k, 1, -1):
         x = start
         for _ in range(_STEPS):
-            left, values, right = np.linalg.svd(scaled_matrix(x))
-            if count > len(values) or values[-count] > _CLOSE:
+            left_vectors, values, right_vectors = np.linalg.svd(scaled_matrix(x))
+            if count > len(values) or values[-count] > _NEARLY_SINGULAR:
                 break
-            if values[-count] <= _VANISHED:
+            if values[-count] <= _ZERO_BLOCK:
                 return design_at(x), complex(*x[-2:])
-            x = x + widths * _newton_step(scaled_matrix, x, widths, left[:, -count:], right[-count:])
-            if (np.abs(x - start) > _REACH * widths)[:-2].any():
+            x = x + widths * _newton_step(scaled_matrix, x, widths, left_vectors[:, -count:], right_vectors[-count:])
+            if (np.abs(x - start) > _MAX_DISTANCE * widths)[:-2].any():
                 break
     return parameters, s
 
 
 def _matrices(problem: Posed, parameters: Numbers) -> list[Array]:
     assert problem.model.pencil is not None
-    found = problem.model.pencil(problem.parameter_set.native(dict(parameters)))
-    return [np.array(P, dtype=float) for P in found]
+    matrices = problem.model.pencil(problem.parameter_set.native(dict(parameters)))
+    return [np.array(P, dtype=float) for P in matrices]
 
 
 def _newton_step(
-    scaled_matrix: Callable[[Array], Complex], x: Array, widths: Array, left: Complex, right: Complex
+    scaled_matrix: Callable[[Array], Complex], x: Array, widths: Array, left_vectors: Complex, right_vectors: Complex
 ) -> Array:
-    """A Gauss–Newton step towards a vanishing block of L, in shares of the box and of the unit of the root."""
+    """A Gauss–Newton step towards a block of L that is 0, in shares of the box and of the unit of the root."""
 
-    def block(at: Array) -> Array:
-        B = (left.conj().T @ scaled_matrix(at) @ right.conj().T).ravel()
+    def block(point: Array) -> Array:
+        B = (left_vectors.conj().T @ scaled_matrix(point) @ right_vectors.conj().T).ravel()
         return np.concatenate([B.real, B.imag])
 
     base = block(x)

@@ -1,4 +1,4 @@
-"""The stability verdict: stable, marginally stable, growing or not stable, and its words."""
+"""The verdict on stability, such as stable, marginally stable or growing, and its description in words."""
 
 import math
 from collections.abc import Collection, Iterable
@@ -22,12 +22,12 @@ CROSSING = "diabolic point (semisimple), not an EP"
 ROUNDED = ", up to rounding errors"
 """Added to a verdict that holds in doubles but was not confirmed in exact arithmetic."""
 
-_TIMES, _FAINT = 2.0, 1e-6
-"""An abscissa counts as 0 up to `_TIMES` its distance from the one as stored, as both have the roots that the pattern
-makes multiple, and up to `_FAINT` of the largest root; beyond that the stored numbers decide."""
+_ROUNDING_FACTOR, _MAX_ROUNDING = 2.0, 1e-6
+"""An ideal abscissa counts as 0 if it is at most `_ROUNDING_FACTOR` times its difference from the abscissa as stored,
+and at most `_MAX_ROUNDING` times the largest root. The difference shows the effect of rounding on multiple roots."""
 
 _LINE = 1e-12
-"""Real parts are equal up to rounding if they differ by less, relative to the largest root."""
+"""Real parts count as equal if they differ by less than this share of the largest root."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class MultipleRoot:
 
     Attributes:
         re, im: the root as users read it.
-        multiplicity: its algebraic multiplicity.
+        multiplicity: the algebraic multiplicity.
         geometric: number of independent eigenvectors; None for a system given by coefficients.
         longest: length of the longest Jordan chain; for coefficients, in the equation p(d/dt) y = 0.
     """
@@ -59,7 +59,7 @@ class MultipleRoot:
 
 
 def power_of_t(longest: int) -> str:
-    """The power of t that multiplies the exponential of a Jordan chain; empty for a chain of one vector."""
+    """The power of t that multiplies the exponential in the motion of a Jordan chain; empty for one vector."""
     return "" if longest < 2 else "t" if longest == 2 else f"t^{longest - 1}"
 
 
@@ -73,7 +73,7 @@ class StabilityVerdict:
     """The verdict on a solution.
 
     Attributes:
-        verdict: one of the words above; empty if the abscissa does not exist.
+        verdict: one of the verdicts such as `STABLE`; empty if the abscissa does not exist.
         growth: the power of t, such as ``t^2``, if the verdict is `GROWING`; else empty.
     """
 
@@ -96,14 +96,14 @@ def stability(
     """The verdict on a solution.
 
     Args:
-        ends: the abscissa of the ideal solution and that as stored; their difference shows the effect of rounding.
+        ends: the abscissa of the ideal solution and the abscissa as stored; they differ by the effect of rounding.
         edges: boundaries of stability that contain the solution, such as ``weave``.
         meetings: multiple roots of the solution.
         largest: size of the largest root.
     """
     if not all(map(math.isfinite, ends)):
         return StabilityVerdict("")
-    rounding = min(_TIMES * abs(ends[0] - ends[1]), _FAINT * largest)
+    rounding = min(_ROUNDING_FACTOR * abs(ends[0] - ends[1]), _MAX_ROUNDING * largest)
     if not edges and not min(ends) <= 0 <= max(ends) and abs(ends[0]) > rounding:
         return StabilityVerdict(STABLE if max(ends) < 0 else UNSTABLE)
     growth = power_of_t(longest_chain_on_line(meetings, ends[0], largest) or 1)
@@ -111,42 +111,42 @@ def stability(
 
 
 def roots_to_json(solution: Any) -> dict[str, Any]:
-    """JSON of the roots, with the facts on multiple ones: for the solution as a whole, and in the entry of each root.
+    """JSON of the roots. Facts on multiple roots are given for the whole solution and in the entry of each root.
 
     Args:
         solution: an object with `roots`, `eigenfrequencies`, `meetings` and `stability`.
     """
-    growing: str = solution.stability.growth
-    found: dict[str, Any] = {}
-    top = max((m.re for m in solution.meetings if m.longest > 1), default=math.nan)
-    near = _LINE * max((r.size for r in solution.roots), default=0.0)  # a root of 1e-17 is shown as 0
+    growth_power: str = solution.stability.growth
+    data: dict[str, Any] = {}
+    largest_re = max((m.re for m in solution.meetings if m.longest > 1), default=math.nan)
+    tolerance = _LINE * max((r.size for r in solution.roots), default=0.0)  # a root of 1e-17 is shown as 0
 
     def chain_facts(m: MultipleRoot) -> dict[str, Any]:
-        grows = {"growth": power_of_t(m.longest)} if growing and m.re == top and m.longest > 1 else {}
-        return {"defective": m.defective, "geometric_multiplicity": m.geometric, **grows}
+        growth = {"growth": power_of_t(m.longest)} if growth_power and m.re == largest_re and m.longest > 1 else {}
+        return {"defective": m.defective, "geometric_multiplicity": m.geometric, **growth}
 
-    for name, each in plain(solution, "roots eigenfrequencies").items():
-        for entry, root in zip(each, solution.roots, strict=True) if each else ():
-            for meeting in (m for m in solution.meetings if math.hypot(m.re - root.re, m.im - root.im) <= near):
+    for name, entries in plain(solution, "roots eigenfrequencies").items():
+        for entry, root in zip(entries, solution.roots, strict=True) if entries else ():
+            for meeting in (m for m in solution.meetings if math.hypot(m.re - root.re, m.im - root.im) <= tolerance):
                 entry.update(chain_facts(meeting))
-        found |= {name: each} if each or name == "roots" else {}
-    first = {n: x for n, x in chain_facts(solution.meetings[0]).items() if n != "growth"} if solution.meetings else {}
-    return first | found
+        data |= {name: entries} if entries or name == "roots" else {}
+    facts = {n: x for n, x in chain_facts(solution.meetings[0]).items() if n != "growth"} if solution.meetings else {}
+    return facts | data
 
 
-def describe_stability(found: StabilityVerdict, *, exact: bool, of_matrices: bool, of_H: bool = False) -> str:
+def describe_stability(verdict: StabilityVerdict, *, exact: bool, of_matrices: bool, of_H: bool = False) -> str:
     """A verdict for a headline.
 
     Args:
         exact: whether roots on the axis and their chains were confirmed in exact arithmetic.
-        of_matrices: whether Jordan chains are known; coefficients only give the scalar equation.
+        of_matrices: whether Jordan chains are known from matrices; coefficients give only p(d/dt) y = 0.
         of_H: whether the system is complex, so that the roots are eigenfrequencies.
     """
-    if not found.on_edge:
-        return found.verdict
+    if not verdict.on_edge:
+        return verdict.verdict
     root = "real eigenfrequency" if of_H else "root on the imaginary axis"
-    why = f"from a defective {root}" if of_matrices else "as the solutions of p(d/dt) y = 0 do"
-    words = f"growing as {found.growth}, {why}" if found.growth else found.verdict
+    reason = f"from a defective {root}" if of_matrices else "as the solutions of p(d/dt) y = 0 do"
+    words = f"growing as {verdict.growth}, {reason}" if verdict.growth else verdict.verdict
     return words if exact else f"{words}{ROUNDED}"
 
 

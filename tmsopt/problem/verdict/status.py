@@ -1,4 +1,4 @@
-"""Describes status and verdict of a solution, and defines the exception for problems without one."""
+"""Describes the status and the verdict of a solution, and defines the exception for problems without a solution."""
 
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def status_text(problem: "Posed", status: str) -> str:
-    """A status in words; with nothing free, an optimal design is called feasible."""
+    """A status in words; if no parameter is free, an optimal design is called feasible."""
     return "feasible" if status == "optimal" and not problem.free else status.replace("_", " ")
 
 
@@ -28,34 +28,37 @@ def describe_status(solution: "Solution") -> str:
         return "none found" if problem.posed.sense == "locate" else "not converged, so a better design may be near"
     if problem.posed.objective is None or not problem.free:
         return "found" if problem.free else "as given"
-    unproved = "stopped before it was proved" if solution.interrupted else "not proved"
-    known = ["proved"] if bound.proven else [*solution.starts.sureness, unproved]
-    return f"optimal ({', '.join(known)})"
+    doubt = "stopped before it was proved" if solution.interrupted else "not proved"
+    evidence = ["proved"] if bound.proven else [*solution.starts.sureness, doubt]
+    return f"optimal ({', '.join(evidence)})"
 
 
 def describe_verdict(solution: "Solution") -> str:
-    """The stability of a solution; if an unstable one was to be stable, also whether any design is."""
-    problem, known, found = solution.problem, solution.any_stable, solution.stability
+    """The stability of a solution in words; if stability was sought in vain, also whether any design is stable."""
+    problem, any_stable, stability = solution.problem, solution.any_stable, solution.stability
     located_none = problem.posed.sense == "locate" and solution.status == "not_converged"
-    if located_none or (solution.status == "infeasible" and known is not False):
+    if located_none or (solution.status == "infeasible" and any_stable is not False):
         return ""
-    limited = problem.locate or len(problem.constraints) > len(problem.posed.asked_of_roots)
-    limits = " and satisfies the constraints" if limited else ""
-    none = f"no design within the ranges is stable{limits} (proved)"
-    unknown = "" if solution.interrupted else "no stable design was found, but not proved that none exists"
-    others = none if known is False else unknown
-    sought = solution.stability_sought and not known
-    if found.verdict != UNSTABLE:
+    is_limited = problem.locate or len(problem.constraints) > len(problem.posed.asked_of_roots)
+    limits = " and satisfies the constraints" if is_limited else ""
+    proof = f"no design within the ranges is stable{limits} (proved)"
+    doubt = "" if solution.interrupted else "no stable design was found, but not proved that none exists"
+    remark = proof if any_stable is False else doubt
+    is_sought = solution.stability_sought and not any_stable
+    if stability.verdict != UNSTABLE:
         model = problem.model
         words = describe_stability(
-            found, exact=solution.edge_is_exact, of_matrices=model.pencil is not None, of_H=model.carrier is not None
+            stability,
+            exact=solution.edge_is_exact,
+            of_matrices=model.pencil is not None,
+            of_H=model.carrier is not None,
         )
-        return f"{words}; {others}" if found.on_edge and sought and others else words
-    if known:
+        return f"{words}; {remark}" if stability.on_edge and is_sought and remark else words
+    if any_stable:
         return "not stable, although some designs within the ranges are stable"
-    if not (known is False or (sought and others)):
+    if not (any_stable is False or (is_sought and remark)):
         return "not stable"
-    return others if solution.status == "infeasible" else f"not stable: {others}"
+    return remark if solution.status == "infeasible" else f"not stable: {remark}"
 
 
 class NotSolved(RuntimeError):
