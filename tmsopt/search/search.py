@@ -11,7 +11,6 @@ from tmsopt.problem import Case, Posed, Starts
 from tmsopt.problem.dependence import WORSE_DIRECTION
 from tmsopt.problem.quantities import RADIUS
 from tmsopt.program.formulate import formulate
-from tmsopt.records import Table
 from tmsopt.search.acceptance import accept_best, is_better
 from tmsopt.search.local_search import solve_from
 from tmsopt.search.outcome import (
@@ -88,7 +87,7 @@ def cover_cases(state: SearchState, policy: Policy, starts: Starts) -> Outcome |
         if sum(trial.checked.violations.values()) > math.sqrt(FEASIBLE) and not problem.asks_radius:
             break  # the current cases are not met
         worst = find_worst_cases(problem, trial.parameters)
-        more = [*_find_uncovered_cases(problem, trial, worst), *_find_nearer_boundary(trial, tuning.nearer)]
+        more = _find_uncovered_cases(problem, trial, worst)
         if not more:
             break
         best, worst = trial if is_better(problem, trial, best) else best, {}
@@ -136,22 +135,6 @@ def _find_uncovered_cases(problem: Posed, trial: CheckedEnd, found: Mapping[str,
         if not excess <= FEASIBLE * (1 + abs(worst.value)) and worst.case not in more:
             more.append(worst.case)
     return more
-
-
-def _find_nearer_boundary(trial: CheckedEnd, least: float) -> list[Case]:
-    """The direction in which stability is lost before the radius that the design claims."""
-    around, nlp = trial.checked.robustness, trial.end.nlp
-    if around is None or RADIUS not in nlp.variables:
-        return []
-    claimed = float(trial.point.x[nlp.variables.index(RADIUS)])
-    if around.radius >= claimed * (1 - least) or not around.limit.found:
-        return []
-    length = around.limit.distance or 1.0
-    step = {n: u / length for n, u in around.limit.direction.items()}
-    known = [c.direction for c in nlp.cases]
-    if any(all(abs(step[n] - k.get(n, 0.0)) < least for n in step) for k in known):  # stable again further out
-        step = {n: u * around.radius / claimed * (1 + least) for n, u in step.items()}
-    return [Case(direction=Table(step))]
 
 
 def _select_apart(problem: Posed, designs: Sequence[Mapping[str, float]], share: float) -> list[Mapping[str, float]]:

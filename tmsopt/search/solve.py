@@ -130,9 +130,7 @@ def solve_any_status(
         return solution
     try:
         solution = _add_stability(solution, options, began, policy)
-        advised, missed = add_required_speed(solution, options)
-        words = "this design was reached from a stable design that the search for the lowest speed found"
-        return _solve_near(advised, missed, words, options, policy) if missed else advised
+        return add_required_speed(solution, options)
     except KeyboardInterrupt:
         if not options.interruptible:
             raise

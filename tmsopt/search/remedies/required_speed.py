@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
@@ -21,16 +21,15 @@ _SECONDS = 0.5  # no second range is searched after this time
 _AT_END = 1e-6  # relative: a speed this close to an end of its range is at that end
 
 
-def add_required_speed(solution: Solution, options: Options) -> tuple[Solution, Mapping[str, float] | None]:
+def add_required_speed(solution: Solution, options: Options) -> Solution:
     """Add the lowest or highest speed at which a design exists, if the present one violates the limits on the roots.
 
-    The problem is solved again at the rounded speed that is shown. If the search meets a design inside the box that was
-    missed, return it as well.
+    The problem is solved again at the rounded speed that the report shows.
     """
     problem = solution.problem.posed
     name = _find_speed(problem)
     if not name or problem.cases or not problem.free or not _can_speed_help(solution):
-        return solution, None
+        return solution
     limits = {} if problem.asked_of_roots or problem.pattern else {STABLE: "abscissa <= 0"}
     few = replace(options, starts=STARTS, progress=None, near=None)
     began, searched = time.perf_counter(), list[float]()
@@ -44,7 +43,7 @@ def add_required_speed(solution: Solution, options: Options) -> tuple[Solution, 
         if found:
             design = (max if highest else min)(found, key=lambda p: p[name])
             if name in problem.free and math.isclose(design[name], ends[highest], rel_tol=_AT_END):
-                return solution, design
+                return solution  # the box has such a design itself, so no other speed is required
             short, one = limit_time(options), unit_of(problem, name).one
             rounded = [round_outwards(design[name] / one, not highest, digits) * one for digits in (DIGITS, 4, 2)]
             with suppress(OutOfTime):
@@ -52,13 +51,13 @@ def add_required_speed(solution: Solution, options: Options) -> tuple[Solution, 
                     fixed = _set_range(problem, name, (shown, shown))
                     if solve_again(fixed, short, problem, thorough=True):
                         need = RequiredValue(name, design[name], highest, ends, Table(design), shown)
-                        return replace(solution, need=need), None
-            return solution, None
+                        return replace(solution, need=need)
+            return solution
         if time.perf_counter() - began > _SECONDS:
             break
     if searched:
         solution = replace(solution, need=RequiredValue(name, math.nan, False, (min(searched), max(searched))))
-    return solution, None
+    return solution
 
 
 def _set_range(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
