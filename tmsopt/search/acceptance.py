@@ -16,7 +16,7 @@ _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_F
 
 
 def accept_best(state: SearchState) -> SearchState:
-    """Add to the state the best end: the first to pass the recheck once polished, or the one that fails it least."""
+    """Add to the state the best end: the first to pass the recheck after polishing, or the one that fails it least."""
     best, tried_objectives = state.best, list[float]()
     for end in sorted((e for e in state.ends[state.accepted :] if e.feasible), key=lambda end: end.objective):
         equal_count = sum(same_objective(end.objective, x, end.nlp.size, state.tuning.same) for x in tried_objectives)
@@ -63,7 +63,7 @@ def has_converged(trial: CheckedEnd) -> bool:
 
 
 def claim_matches(problem: Posed, trial: CheckedEnd) -> bool:
-    """Whether the objective that the solver claims equals the one of the recheck."""
+    """Whether the objective that the solver claims equals that of the recheck."""
     if problem.objective is None:
         return True
     claim, objective, tolerance = problem.sign * trial.point.objective, trial.checked.objective, trial.tuning.claimed

@@ -58,7 +58,10 @@ def find_multiple_roots(state: SearchState, policy: Policy) -> list[Start]:
 
 
 def can_have_positive_roots(state: SearchState) -> bool:
-    """Whether the best design may have a positive real root, whose damping ratio −1 the program's sector excludes."""
+    """Whether the best design may have a positive real root, which has the damping ratio −1.
+
+    If the damping ratio is a variable, the factors of the program keep all roots in a sector, which excludes this one.
+    """
     if "damping_ratio" not in state.nlp.variables:
         return False
     if state.best is None or "damping_ratio" in state.nlp.contacts:  # then a smaller damping ratio may be better

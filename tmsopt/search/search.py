@@ -1,4 +1,4 @@
-"""Search one part of the box: from its initial state to a design with a status, which includes its worst cases."""
+"""Search one part of the box: from the initial state to a design with a status, checked also in its worst cases."""
 
 import math
 from collections.abc import Mapping, Sequence

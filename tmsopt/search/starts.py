@@ -1,4 +1,4 @@
-"""Designs to start from: the caller's, then refined and bold designs of the sample in turn, then random ones."""
+"""Designs to start from: the caller's, then refined and bold designs of the sample in turn, then quasi-random ones."""
 
 from collections.abc import Iterator
 from itertools import zip_longest

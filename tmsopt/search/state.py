@@ -75,7 +75,7 @@ class LocalEnd:
 
     @property
     def weight(self) -> int:
-        """How many starts the end counts for: a sampled design that leads straight to it counts as a start."""
+        """For how many starts the end counts: a sampled design that leads straight to the end counts as a start."""
         return 1 + len(self.led)
 
     @property

@@ -21,9 +21,8 @@ def is_enough(state: SearchState) -> bool:
         return is_hopeless(state)
     best, count = min(end.objective for end in feasible), len(state.ends)
     starts = count_starts(state.ends, best, tuning.same)
-    if (
-        state.problem.objective is None
-    ):  # any solution will do; where solutions form a continuum, several starts must agree
+    # Without an objective, any solution will do; where solutions form a continuum, several starts must agree.
+    if state.problem.objective is None:
         freedom = degrees_of_freedom(state.part).count
         is_met = freedom == 0 or (freedom < 0 and best <= tuning.met_conditions)
         return starts.at_best >= (1 if is_met else tuning.agree)
