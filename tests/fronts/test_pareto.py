@@ -253,7 +253,7 @@ def test_a_half_that_is_left_out_is_not_searched():
     policy = replace(tmsopt.POLICY, enough=lambda state: bool(searched.add(state.side)) or tmsopt.POLICY.enough(state))
     start = {"Fr": 2.2, "chi_B": 1.4, "lambda_s": 0.7}
     without = ["reversed rake"]
-    found = solve_any_status(asked, extra_starts=[start], without_sample=True, without=without, policy=policy)
+    found = solve_any_status(asked, extra_starts=[start], without_sample=True, skipped_parts=without, policy=policy)
     assert searched == {"normal rake"}
     assert found.value == pytest.approx(EP4[0], abs=1e-8)
 

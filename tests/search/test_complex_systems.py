@@ -244,7 +244,7 @@ def test_the_threshold_is_the_edge_and_says_which_eigenfrequency_is_real():
     assert found.to_json()["stable"] is False
     assert found.notes == ()
     report = found.report()
-    assert "found: marginally stable\n" in report
+    assert "marginally stable\n" in report
     assert f"neither loss nor gain; {real:.5g} is real" in report
 
 

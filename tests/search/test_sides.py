@@ -42,7 +42,7 @@ def test_the_winner_is_named_and_each_side_is_its_own_problem(fixed, winner):
     assert list(design.sides) == [FORWARD, BACKWARD]
     for side, value in design.sides.items():
         assert value == pytest.approx(tmsopt.solve(on(side, stated), starts=16).value, abs=1e-6 * (1 + abs(value)))
-    assert [f"{winner} wins" in n for n in design.notes if "both signs" in n] == [True]
+    assert [f"{winner} is better" in n for n in design.notes if "both signs" in n] == [True]
     shown = {side: float(f"{value:.9g}") for side, value in design.sides.items()}  # of designs that are not shown
     assert json.loads(json.dumps(design.to_json()))["sides"] == shown
 
@@ -54,7 +54,7 @@ def test_the_dual_of_a_problem_has_the_dual_of_its_answer():
     forward = tmsopt.solve(problem(minimize="Fr", constraints=decay), starts=16)
     backward = tmsopt.solve(problem(SWAPPED, minimize="Fr/chi_B", constraints=decay), starts=16)
     assert forward.sides[FORWARD] == pytest.approx(backward.sides[BACKWARD], abs=1e-9)
-    assert any("reversed rake wins" in n for n in backward.notes)
+    assert any("reversed rake is better" in n for n in backward.notes)
     own = {n: forward.parameters[n] for n in ("Fr", "chi_B", "zeta_B", "zeta_H", "lambda_s")}
     dual = {n: float(v) for n, v in laws.dual(**own).items()}
     for name, value in dual.items():
@@ -84,7 +84,7 @@ def test_maximising_takes_the_greater_side(sign, winner):
     assert steep.value == pytest.approx(2.64, abs=1e-7)
     assert steep.sides == pytest.approx({FORWARD: 0.24, BACKWARD: 0.24} | {winner: 2.64}, abs=1e-7)
     assert abs(steep.parameters["lambda_s"]) == pytest.approx(1.2, abs=1e-8)
-    assert any(f"{winner} wins" in n for n in steep.notes)
+    assert any(f"{winner} is better" in n for n in steep.notes)
 
 
 def test_a_start_on_the_losing_side_does_not_decide():
@@ -109,7 +109,7 @@ def test_matching_on_both_sides():
     design = tmsopt.solve(problem(SWAPPED, locate="EP4"))
     law = laws.ep4_chi_H_1(-0.2, -0.4)
     assert np.tan(design.parameters["lambda_s"]) == pytest.approx(float(law.tan_lambda_s), abs=1e-10)
-    assert any("reversed rake wins" in n for n in design.notes)
+    assert any("reversed rake is better" in n for n in design.notes)
 
 
 def test_sides_that_are_equally_good_are_said_to_be():
@@ -119,7 +119,7 @@ def test_sides_that_are_equally_good_are_said_to_be():
     assert design.sides[FORWARD] == pytest.approx(design.sides[BACKWARD], abs=1e-12)
     (note,) = (n for n in design.notes if "both signs" in n)
     assert "is as good as" in note
-    assert "wins" not in note
+    assert "is better" not in note
 
 
 def test_the_side_with_the_best_design_of_a_sample_is_searched_first():

@@ -1,7 +1,8 @@
 """Search for designs: a sample of the box, local solves, rescues, remedies, all designs.
 
-In: a `Problem`. Out: a rechecked `Solution`, or the least change of limits that makes one possible. Open `policy`
-first: it holds the loop. Then read `search`, which puts its stages together, and `solve`, which makes the `Solution`.
+The input is a `Problem`. The result is a rechecked `Solution`, or the least change of limits that makes one possible.
+Open `policy` first, which holds the loop. Then read `search`, which fills in its stages, and `solve`, which makes the
+`Solution`.
 """
 
 import lazy_loader

@@ -1,4 +1,7 @@
-"""Choose the best end of a search, polish it by Newton's method and recheck it."""
+"""Choose the best end of a search, polish it by Newton's method and recheck it.
+
+An *end* is where the solver stopped after one start; a *trial* is an end that is polished and rechecked.
+"""
 
 import math
 from dataclasses import replace
@@ -13,15 +16,15 @@ _CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_F
 
 
 def accept_best(state: SearchState) -> SearchState:
-    """Add to the state the best end: the first to pass the recheck once polished, or the one that fails it least."""
-    best, tried = state.best, list[float]()
+    """Add to the state the best end: the first to pass the recheck after polishing, or the one that fails it least."""
+    best, tried_objectives = state.best, list[float]()
     for end in sorted((e for e in state.ends[state.accepted :] if e.feasible), key=lambda end: end.objective):
-        alike = sum(same_objective(end.objective, value, end.nlp.size, state.tuning.same) for value in tried)
-        if best and is_sound(state.problem, best) and not alike and best.end.objective <= end.objective:
+        equal_count = sum(same_objective(end.objective, x, end.nlp.size, state.tuning.same) for x in tried_objectives)
+        if best and is_sound(state.problem, best) and not equal_count and best.end.objective <= end.objective:
             break
-        if alike >= state.tuning.alike:
+        if equal_count >= state.tuning.alike:
             continue
-        tried.append(end.objective)
+        tried_objectives.append(end.objective)
         trial = check_end(state, end)
         if best is None or is_better(state.problem, trial, best):
             best = trial
@@ -38,13 +41,13 @@ def check_end(state: SearchState, end: LocalEnd) -> CheckedEnd:
 
 
 def recheck_inside_box(state: SearchState, trial: CheckedEnd) -> CheckedEnd:
-    """Clip an end to the box and recheck it, so that no stage or rescue can make it look better than it is."""
+    """Clip a trial to the box and recheck it, so that no stage or rescue can make it look better than it is."""
     parameters = state.problem.ordered(clip_to_box(state.part, trial.parameters))
     return replace(trial, parameters=parameters, checked=recheck(state.problem, parameters, trial.end.nlp.cases))
 
 
 def is_sound(problem: Posed, trial: CheckedEnd) -> bool:
-    """Whether a trial violates nothing and its objective is the one the solver claims."""
+    """Whether a trial violates no limit and has the objective that the solver claims."""
     return not trial.checked.violations and claim_matches(problem, trial) and not _counts_unreached_root(trial)
 
 
@@ -54,20 +57,20 @@ def is_stationary(trial: CheckedEnd) -> bool:
 
 
 def has_converged(trial: CheckedEnd) -> bool:
-    """Whether the end is an optimum of the solver, by its status or by the gradient, and its rows hold."""
+    """Whether the solver's status or the gradient shows an optimum, and the rows of the program hold there."""
     tuning, optimal = trial.tuning, trial.end.run.status in _CONVERGED or is_stationary(trial)
     return optimal and (trial.point.violation <= tuning.exact or trial.point.stationarity <= tuning.polished)
 
 
 def claim_matches(problem: Posed, trial: CheckedEnd) -> bool:
-    """Whether the objective that the solver claims equals the one of the recheck."""
+    """Whether the objective that the solver claims equals that of the recheck."""
     if problem.objective is None:
         return True
-    claimed, own, most = problem.sign * trial.point.objective, trial.checked.objective, trial.tuning.claimed
-    return math.isclose(claimed, own, rel_tol=most, abs_tol=most)
+    claim, objective, tolerance = problem.sign * trial.point.objective, trial.checked.objective, trial.tuning.claimed
+    return math.isclose(claim, objective, rel_tol=tolerance, abs_tol=tolerance)
 
 
-def is_better(problem: Posed, one: CheckedEnd, other: CheckedEnd) -> bool:
+def is_better(problem: Posed, candidate: CheckedEnd, other: CheckedEnd) -> bool:
     """Whether one trial beats another: by violation first, then by the objective of the recheck.
 
     If the solver claims another objective, the difference counts against the trial. Among equally good trials, one that
@@ -75,18 +78,18 @@ def is_better(problem: Posed, one: CheckedEnd, other: CheckedEnd) -> bool:
     """
 
     def rank(trial: CheckedEnd) -> tuple[float, bool, float]:
-        claimed, own = trial.point.objective, problem.sign * trial.checked.objective
-        doubt = 0.0 if claim_matches(problem, trial) else trial.tuning.doubt * abs(claimed - own)
-        objective = claimed if math.isnan(own) else own + doubt
+        claim, value = trial.point.objective, problem.sign * trial.checked.objective
+        doubt = 0.0 if claim_matches(problem, trial) else trial.tuning.doubt * abs(claim - value)
+        objective = claim if math.isnan(value) else value + doubt
         return sum(trial.checked.violations.values()), _counts_unreached_root(trial), objective
 
-    (*first, a), (*second, b) = rank(one), rank(other)
-    if first == second and same_objective(a, b, one.end.nlp.size, one.tuning.finer):
-        return has_converged(one) and not has_converged(other)
+    (*first, a), (*second, b) = rank(candidate), rank(other)
+    if first == second and same_objective(a, b, candidate.end.nlp.size, candidate.tuning.finer):
+        return has_converged(candidate) and not has_converged(other)
     return (*first, a) < (*second, b)
 
 
 def _counts_unreached_root(trial: CheckedEnd) -> bool:
-    """Whether an end that has not converged is rated by a multiple root that it only comes close to."""
-    ideal, stored, most = trial.checked.structure.abscissa, trial.checked.realised, trial.tuning.claimed
-    return not has_converged(trial) and not math.isclose(ideal, stored, rel_tol=most, abs_tol=most)
+    """Whether a trial that has not converged is rated by a multiple root that it is only close to."""
+    ideal, stored, tolerance = trial.checked.structure.abscissa, trial.checked.realised, trial.tuning.claimed
+    return not has_converged(trial) and not math.isclose(ideal, stored, rel_tol=tolerance, abs_tol=tolerance)

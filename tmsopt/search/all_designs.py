@@ -1,4 +1,4 @@
-"""All designs with a pattern in a box: proved complete, or those that many starts find, with an estimate of others."""
+"""Find all designs with a pattern in a box: with a proof, or from many starts with an estimate of missed designs."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -25,23 +25,25 @@ from tmsopt.search.newton import build_square_system, estimate_error, find_zero,
 from tmsopt.search.solve import solve_any_status
 from tmsopt.search.state import SearchState, Start, clip_to_box, is_close
 
-MOST = 1024
+MAX_STARTS = 1024
 """Largest number of starts."""
 
-_DEFAULTS = Options(starts=MOST)
-_FEWEST = 48  # starts at least
-_MIN_HITS = 3  # of every solution before the search may end
-_SAME = 1e-7  # of the box: distance below which two designs are one solution
-_INSIDE = 1e-9  # of the box: ends this far outside are moved to its edge
-_IPOPT_EVERY = 4  # starts per run of IPOPT, which finds solutions that Newton's method misses
-_ROUNDING = 1e-15  # relative, of a double and of a root
-_DEVIATIONS = 2.0  # added to the estimate: with `_NEVER`, 95 % for few or many solutions, equally likely or not
-_NEVER = 3.0  # −ln 5 %: an event seen in none of n starts has a chance below 3/n, with 95 % confidence
+_DEFAULTS = Options(starts=MAX_STARTS)
+_MIN_STARTS = 48
+_MIN_HITS = 3  # starts that must lead to each solution before the search may end
+_SAME_DESIGN = 1e-7  # of the box: distance below which two designs are one solution
+_OUTSIDE = 1e-9  # of the box: solutions this far outside it still count as inside
+_STARTS_PER_IPOPT_RUN = 4  # IPOPT finds solutions that Newton's method misses
+_ROUNDING = 1e-15  # smallest relative error bound of a parameter and of the abscissa
+# Standard deviations added to the estimated chance; with `_UNSEEN_EVENTS` the bound has 95 % confidence, for few and
+# for many solutions, equally likely or not.
+_DEVIATIONS = 2.0
+_UNSEEN_EVENTS = 3.0  # −ln 5 %: an event seen in none of n starts has a chance below 3/n, with 95 % confidence
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """How completely a search of many starts covered the solutions.
+    """How completely a search from many starts covered the solutions.
 
     Attributes:
         starts: number of starts, spread evenly over the box.
@@ -62,19 +64,19 @@ class Coverage:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
-        found = plain(self)
+        data = plain(self)
         expected = round(self.expected, 4) if math.isfinite(self.expected) else None
-        return found | {"expected": expected, "chance": round(self.chance, 6)}
+        return data | {"expected": expected, "chance": round(self.chance, 6)}
 
 
 @dataclass(frozen=True, repr=False)
 class Every(Tabular):
-    """All solutions found.
+    """All solutions that were found.
 
     Attributes:
-        solutions: ordered by their parameters if proved complete, else the most frequent first.
-        coverage: of the search; None without one.
-        completeness: of the proof; None without one.
+        solutions: ordered by their parameters if they are proved to be all, else the most frequent first.
+        coverage: how completely the search covered the solutions; None without a search.
+        completeness: result of the proof; None without a proof.
         proved: for each solution, whether it is proved to exist.
         errors: for each solution, error bounds of its free parameters and its abscissa.
 
@@ -100,19 +102,19 @@ class Every(Tabular):
     def records(self) -> Iterable[dict[str, Any]]:
         """One row for each design."""
         for solution, proved in zip(self.solutions, self._proved_flags(), strict=True):
-            found = {"abscissa": solution.abscissa, "structure": solution.structure, "stable": solution.stable}
-            yield {**solution.parameters, **found, "proved": proved}
+            values = {"abscissa": solution.abscissa, "structure": solution.structure, "stable": solution.stable}
+            yield {**solution.parameters, **values, "proved": proved}
 
     def _proved_flags(self) -> tuple[bool, ...]:
         return self.proved or (False,) * len(self.solutions)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``: each solution with ``proved``; also ``complete`` and ``undecided``."""
-        found = plain(self)
-        for solution, proved in zip(found["solutions"], self._proved_flags(), strict=True):
+        data = plain(self)
+        for solution, proved in zip(data["solutions"], self._proved_flags(), strict=True):
             solution["proved"] = proved
         proof = self.completeness
-        return found | {"complete": self.complete, "undecided": len(proof.undecided) if proof else None}
+        return data | {"complete": self.complete, "undecided": len(proof.undecided) if proof else None}
 
 
 @documents_options(CommonOptions, _DEFAULTS)
@@ -126,7 +128,7 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Com
 
     Args:
         seconds: time limit of the proof; 0 skips it.
-        options: ``starts`` at most, `MOST` by default, ``seed``, ``linear_solver`` and ``progress``; see
+        options: ``starts`` at most, `MAX_STARTS` by default, ``seed``, ``linear_solver`` and ``progress``; see
             `tmsopt.Options`.
 
     Raises:
@@ -148,124 +150,129 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Com
     state = SearchState(problem, problem, nlp, make_options(options, defaults=_DEFAULTS))
     begin(state.options.progress, "proving that no design is missed", "s")
     proof = prove_completeness(problem, seconds, state.options.progress) if seconds > 0 else None
-    proved = list[_Found]()
-    for at in proof.designs if proof else ():
-        errors = {n: float(x.radius) for n, x in at.items()} | {"abscissa": 0.0}
-        proved.append(_Found(_drop_tiny(clip_to_box(problem, {n: float(x) for n, x in at.items()})), errors))
-    found, coverage = ([], None) if proof and (proof.complete or proof.stopped) else _search_starts(state)
-    new = [one for one in proved if not any(one.is_same(problem, other) for other in found)]
+    proved_entries = list[_IsolatedDesign]()
+    for intervals in proof.designs if proof else ():
+        errors = {n: float(x.radius) for n, x in intervals.items()} | {"abscissa": 0.0}
+        design = clip_to_box(problem, {n: float(x) for n, x in intervals.items()})
+        proved_entries.append(_IsolatedDesign(_drop_tiny(design), errors))
+    met_entries, coverage = ([], None) if proof and (proof.complete or proof.stopped) else _search_starts(state)
+    only_proved = [entry for entry in proved_entries if not any(entry.is_same(problem, other) for other in met_entries)]
     if coverage:
-        coverage = replace(coverage, hits=(*coverage.hits, *[0] * len(new)))
-    solutions, exists, bounds = list[Solution](), list[bool](), list[Table[float]]()
-    for one in (*found, *new):
-        solution = _make_solution(problem, one.design)
-        matches = [other for other in proved if one.is_same(problem, other)]
-        errors = one.errors | (matches[0].errors if matches else {})
-        size = max((r.size for r in solution.roots), default=0.0)
-        least = {n: abs(solution.parameters[n]) for n in problem.free} | {"abscissa": size}
+        coverage = replace(coverage, hits=(*coverage.hits, *[0] * len(only_proved)))
+    solutions, existence, bounds = list[Solution](), list[bool](), list[Table[float]]()
+    for entry in (*met_entries, *only_proved):
+        solution = _make_solution(problem, entry.design)
+        matches = [other for other in proved_entries if entry.is_same(problem, other)]
+        errors = entry.errors | (matches[0].errors if matches else {})
+        largest_root = max((r.size for r in solution.roots), default=0.0)
+        sizes = {n: abs(solution.parameters[n]) for n in problem.free} | {"abscissa": largest_root}
         solutions.append(solution)
-        exists.append(bool(matches))
-        bounds.append(Table({n: max(errors.get(n, 0.0), _ROUNDING * x) for n, x in least.items()}))
-    return Every(tuple(solutions), coverage, proof, tuple(exists), tuple(bounds))
+        existence.append(bool(matches))
+        bounds.append(Table({n: max(errors.get(n, 0.0), _ROUNDING * x) for n, x in sizes.items()}))
+    return Every(tuple(solutions), coverage, proof, tuple(existence), tuple(bounds))
 
 
 @dataclass(eq=False)
-class _Found:
-    """A solution: its free parameters, error bounds of these and of the abscissa, the starts that led to it."""
+class _IsolatedDesign:
+    """A solution: its free parameters, error bounds of these and of the abscissa, and how many starts led to it."""
 
     design: dict[str, float]
     errors: dict[str, float]
     hits: int = 0
 
-    def is_same(self, problem: Posed, other: "_Found") -> bool:
-        return is_close(problem, self.design, other.design, _SAME)
+    def is_same(self, problem: Posed, other: "_IsolatedDesign") -> bool:
+        return is_close(problem, self.design, other.design, _SAME_DESIGN)
 
 
-def _search_starts(state: SearchState) -> tuple[list[_Found], Coverage]:
-    """Solutions found from many starts, the most frequent first, and the coverage."""
+def _search_starts(state: SearchState) -> tuple[list[_IsolatedDesign], Coverage]:
+    """Return the solutions that many starts lead to, the most frequent first, and the coverage."""
     problem, nlp, starts, progress = state.problem, state.nlp, state.options.starts, state.options.progress
     begin(progress, "searching", "start")
     system = build_square_system(nlp)
     assert system is not None  # as many conditions as parameters
-    found = list[_Found]()
-    done = singular = crossings = 0
+    entries = list[_IsolatedDesign]()
+    start_count = singular = crossings = 0
     for start in islice(sample_box(problem, state.options.seed), starts):
-        if _is_covered(done, [one.hits for one in found]):
+        if _is_covered(start_count, [entry.hits for entry in entries]):
             break
         ends = [find_zero(system, x) for x in complete_starts(nlp, problem, start)]
-        if done % _IPOPT_EVERY == 0 and (local := solve_from(state, Start(start, near=False))).feasible:
+        if start_count % _STARTS_PER_IPOPT_RUN == 0 and (local := solve_from(state, Start(start, near=False))).feasible:
             ends.append(find_zero(system, local.run.x) or make_zero(system, local.run.x))
-        reached = set[_Found]()
-        doubtful = crossed = False
+        reached_entries = set[_IsolatedDesign]()
+        met_singular = met_crossing = False
         for end in filter(None, ends):
             design = _take_design(problem, nlp, end.x)
             if design is None:
                 continue
-            one = _Found(design, {})
-            known = next((other for other in found if one.is_same(problem, other)), None)
-            if end.isolated and known:
-                reached.add(known)
+            entry = _IsolatedDesign(design, {})
+            match = next((other for other in entries if entry.is_same(problem, other)), None)
+            if end.isolated and match:
+                reached_entries.add(match)
                 continue
             checked = recheck(problem, problem.ordered(design))
             if not end.isolated:
-                doubtful, crossed = doubtful or not checked.violations, crossed or checked.crossing
+                met_singular, met_crossing = met_singular or not checked.violations, met_crossing or checked.crossing
             elif not checked.violations:
                 # An angle's error is at most its tangent's; the other variables are the factors' coefficients.
                 errors = estimate_error(system, end.x).tolist()
-                one.errors = dict(zip(problem.free, errors, strict=False))
-                one.errors["abscissa"] = max(errors[len(problem.free) :], default=0.0)
-                found.append(one)
-                reached.add(one)
-        for one in reached:
-            one.hits += 1
-        singular += doubtful and not reached
-        crossings += crossed and not reached
-        done += 1
+                entry.errors = dict(zip(problem.free, errors, strict=False))
+                entry.errors["abscissa"] = max(errors[len(problem.free) :], default=0.0)
+                entries.append(entry)
+                reached_entries.add(entry)
+        for entry in reached_entries:
+            entry.hits += 1
+        singular += met_singular and not reached_entries
+        crossings += met_crossing and not reached_entries
+        start_count += 1
         if progress:
-            progress(done, starts)
-    found.sort(key=lambda one: -one.hits)
-    coverage = estimate_coverage(done, [one.hits for one in found], singular)
-    return found, replace(coverage, crossings=crossings)
+            progress(start_count, starts)
+    entries.sort(key=lambda entry: -entry.hits)
+    coverage = estimate_coverage(start_count, [entry.hits for entry in entries], singular)
+    return entries, replace(coverage, crossings=crossings)
 
 
 def _build_equations(problem: Posed) -> NLP:
-    """The equations of a problem; refuses problems whose solutions are not isolated."""
-    counted = degrees_of_freedom(problem)
+    """Return the equations of a problem.
+
+    Raises:
+        InputError: if the solutions of the problem are not isolated.
+    """
+    freedom = degrees_of_freedom(problem)
     if problem.pattern is None or problem.objective is not None:
         order = min(max(len(problem.free) + 1, 2), problem.model.degree)  # as many conditions as free parameters
         needed = f"needs a pattern and no objective; write e.g. locate = 'EP{order}' instead of minimize or maximize"
         raise input_error(needed, "objective")
     if problem.cases:
         raise input_error("scenarios and tolerances leave no isolated solutions; remove them", "parameters")
-    if counted.kind != "square":
-        advice = "free fewer, or add == constraints" if counted.count > 0 else "free more, or drop conditions"
-        free = f"{counted.free} free parameter{'' if counted.free == 1 else 's'}"
-        conditions = f"{counted.conditions} condition{'' if counted.conditions == 1 else 's'}"
+    if freedom.kind != "square":
+        advice = "free fewer, or add == constraints" if freedom.count > 0 else "free more, or drop conditions"
+        free = f"{freedom.free} free parameter{'' if freedom.free == 1 else 's'}"
+        conditions = f"{freedom.conditions} condition{'' if freedom.conditions == 1 else 's'}"
         raise input_error(f"{free} and {conditions} do not give isolated solutions; {advice}", "parameters")
     nlp = formulate_matching(problem)
     if nlp.contacts:
-        found = f"the constraints use {', '.join(nlp.contacts)}, which only the roots define"
+        fault = f"the constraints use {', '.join(nlp.contacts)}, which only the roots define"
         accepted = "parameters, coefficients, and quantities with a formula in these"
         advice = "rewrite the constraints, or use solve, which finds one design and names other solutions"
-        raise input_error(f"{found}; accepted: {accepted}; {advice}", "constraints")
+        raise input_error(f"{fault}; accepted: {accepted}; {advice}", "constraints")
     return nlp
 
 
 def _drop_tiny(design: Mapping[str, float]) -> dict[str, float]:
-    """Numbers too small for a problem become 0."""
+    """Replace numbers that are too small for a problem by 0."""
     return {n: x if abs(x) >= SMALLEST else 0.0 for n, x in design.items()}
 
 
 def _take_design(problem: Posed, nlp: NLP, x: Array) -> dict[str, float] | None:
     """The free parameters of a solution in the box; None if it is outside."""
-    own, lower, upper = (np.array(values[: len(problem.free)]) for values in (x, nlp.lower, nlp.upper))
-    outside = np.any(np.maximum(lower - own, own - upper) > _INSIDE * (upper - lower))
+    parameters, lower, upper = (np.array(values[: len(problem.free)]) for values in (x, nlp.lower, nlp.upper))
+    outside = np.any(np.maximum(lower - parameters, parameters - upper) > _OUTSIDE * (upper - lower))
     return None if outside else _drop_tiny(design_of(problem, x.tolist()))
 
 
-def _is_covered(done: int, hits: list[int]) -> bool:
+def _is_covered(start_count: int, hits: list[int]) -> bool:
     """Whether more starts are unlikely to find another solution."""
-    if done < _FEWEST:
+    if start_count < _MIN_STARTS:
         return False
     return not hits or (min(hits) >= _MIN_HITS and _estimate_total(hits) <= len(hits) + 0.5)
 
@@ -276,15 +283,16 @@ def _estimate_total(hits: list[int]) -> float:
     return w * (n - 1) / (n - w - 2) if n > w + 2 else math.inf if w else 0.0
 
 
-def estimate_coverage(done: int, hits: list[int], singular: int = 0) -> Coverage:
-    """The coverage of a search, with the chance of a new solution by Good and Turing (Good 1953)."""
-    once, twice = (sum(h == k for h in hits) for k in (1, 2))
-    deviation = math.sqrt(once + 2 * twice)  # of `once`, Turing's estimate of n times the chance
-    chance = min(1.0, (once + _DEVIATIONS * deviation + _NEVER) / max(done, 1))
-    return Coverage(done, tuple(hits), _estimate_total(hits), chance, singular)
+def estimate_coverage(start_count: int, hits: list[int], singular: int = 0) -> Coverage:
+    """Estimate the coverage of a search; the chance of a new solution is that of Good and Turing (Good 1953)."""
+    hit_once, hit_twice = (sum(h == k for h in hits) for k in (1, 2))
+    # Turing's estimate of the chance is `hit_once` / `start_count`; this is the standard deviation of `hit_once`.
+    deviation = math.sqrt(hit_once + 2 * hit_twice)
+    chance = min(1.0, (hit_once + _DEVIATIONS * deviation + _UNSEEN_EVENTS) / max(start_count, 1))
+    return Coverage(start_count, tuple(hits), _estimate_total(hits), chance, singular)
 
 
 def _make_solution(problem: Posed, design: Mapping[str, float]) -> Solution:
-    """The solution at a design: of the same problem with nothing free."""
+    """Make the solution at a design by solving the same problem with all parameters fixed there."""
     fixed = solve_any_status(problem.derive(fixed=problem.ordered(design), free={}, start={}))
     return replace(fixed, problem=problem.problem, freedom=degrees_of_freedom(problem), formulation="matching")

@@ -1,4 +1,4 @@
-"""One local search: IPOPT from one start, repeated if it ends badly; other starts that would lead to the same end."""
+"""One local search: run IPOPT from one start, repeat it if it ends badly, and find other starts with the same end."""
 
 import math
 from dataclasses import replace
@@ -16,17 +16,17 @@ from tmsopt.search.stopping import is_proven
 
 
 def solve_from(state: SearchState, start: Start) -> LocalEnd:
-    """Solve from one start; if IPOPT does not converge, factor the roots anew and go on while that helps."""
+    """Solve from one start; if IPOPT does not converge, start again from its end with new factors, while that helps."""
     tuning, exact = state.tuning, state.nlp.cases and state.nlp.exact
     best = run_once(state, start, "near" if start.near else "exact" if exact else "far")
-    for again in range(tuning.restarts):
+    for restart in range(tuning.restarts):
         converged = (
             best.feasible and best.run.status == "Solve_Succeeded" and not best.nlp.has_split_double_root(best.run.x)
         )
-        exhausted = not best.feasible and again >= count_restarts(state)
+        exhausted = not best.feasible and restart >= count_restarts(state)
         if converged or exhausted or not np.all(np.isfinite(best.run.x)):
             break
-        end = run_once(state, replace(start, design=state.design_at(best)), "far" if again % 2 else "near")
+        end = run_once(state, replace(start, design=state.design_at(best)), "far" if restart % 2 else "near")
         if best.feasible and (not end.feasible or end.objective >= best.objective - tuning.same):
             break
         best = end
@@ -34,7 +34,7 @@ def solve_from(state: SearchState, start: Start) -> LocalEnd:
 
 
 def count_restarts(state: SearchState) -> int:
-    """How often to restart from an end that violates rows: more often if feasible ends are likely."""
+    """Return how often to restart from an end that violates rows: more often if feasible ends are likely."""
     if state.feasible:
         return state.tuning.restarts if state.sample is None else 1
     blind = state.sample is None and len(state.ends) >= state.tuning.blind
@@ -42,34 +42,37 @@ def count_restarts(state: SearchState) -> int:
 
 
 def run_once(state: SearchState, start: Start, settings: str) -> LocalEnd:
-    """The best end of IPOPT over the ways in which root quantities and kinks can be held at the start."""
+    """Run IPOPT in a few ways and return the best end.
+
+    The ways differ in which root determines each root quantity, and on which side of each kink the program stays.
+    """
     x = initial_point(state.nlp, state.part, start.design, settings == "near")
     ways = islice(state.nlp.impose_contacts(x), state.tuning.ways)
     return min((_run_ipopt(state, start, x, way, settings) for way in ways), key=lambda end: end.rank)
 
 
 def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
-    """The end, or the end of a run with other settings if the start was better."""
+    """Return the end; if the start was better, run with other settings, and return the better of the two ends."""
     if state.sample is None or not best.feasible:
         return best
     box = state.sample.box
-    seen = box.judge_points(box.space.points(start.design)[None])
-    if seen.violation[0] > 0 or seen.objective[0] >= best.objective - state.tuning.same:
+    start_batch = box.judge_points(box.space.points(start.design)[None])
+    if start_batch.violation[0] > 0 or start_batch.objective[0] >= best.objective - state.tuning.same:
         return best
-    kept = run_once(state, start, "far" if start.near else "near")
-    return kept if kept.feasible and kept.objective < best.objective else best
+    rerun = run_once(state, start, "far" if start.near else "near")
+    return rerun if rerun.feasible and rerun.objective < best.objective else best
 
 
 def exchange_contacts(state: SearchState, best: LocalEnd) -> LocalEnd:
-    """The best end over other ways of holding root quantities that are as close as the current one."""
+    """Return the best end over other ways (see `run_once`) that fit the end as well as the current one."""
     for _ in range(state.tuning.exchanges if state.nlp.contacts and best.feasible else 0):
         x = best.run.x
-        others = (way for way in state.nlp.impose_contacts(x, state.tuning.meets) if way != best.nlp)
-        ends = [_run_ipopt(state, best.start, x, way, "near") for way in islice(others, 2 * state.tuning.ways)]
-        other = min(ends, key=lambda end: end.rank, default=best)
-        if not (other.feasible and other.objective < best.objective - state.tuning.same):
+        other_ways = (way for way in state.nlp.impose_contacts(x, state.tuning.meets) if way != best.nlp)
+        ends = [_run_ipopt(state, best.start, x, way, "near") for way in islice(other_ways, 2 * state.tuning.ways)]
+        best_exchange = min(ends, key=lambda end: end.rank, default=best)
+        if not (best_exchange.feasible and best_exchange.objective < best.objective - state.tuning.same):
             break
-        best = other
+        best = best_exchange
     return best
 
 
@@ -81,7 +84,7 @@ def _run_ipopt(state: SearchState, start: Start, x: Array, limits: NLP, settings
     if not np.all(np.isfinite([f, *rows, *run.x])):
         return end
     outside = np.maximum(np.array(limits.row_lower) - rows, rows - np.array(limits.row_upper)).clip(0)
-    # Rows that hold to 1e-12 may hide 1e-6 in a double root, whose square they constrain.
+    # Rows constrain the square of the distance in a double root: if they hold to 1e-12, it may be 1e-6.
     claim = 2 * float(np.abs(np.nan_to_num(run.row_multipliers)) @ outside) if limits.contacts else 0.0
     end, feasible = replace(end, objective=f + claim), outside.max(initial=0.0) <= state.tuning.feasible
     if not feasible or run.status == "Infeasible_Problem_Detected" or _is_spurious(state, end):
@@ -92,7 +95,10 @@ def _run_ipopt(state: SearchState, start: Start, x: Array, limits: NLP, settings
 
 
 def _is_spurious(state: SearchState, end: LocalEnd) -> bool:
-    """Whether the factors claim an abscissa left of the roots: near a0 = 0 all terms of the equations vanish."""
+    """Whether the factors claim an abscissa left of the roots.
+
+    This can happen near a0 = 0, where all terms of the equations vanish.
+    """
     nlp = end.nlp
     if "abscissa" not in nlp.variables:
         return False
@@ -112,19 +118,21 @@ def _add_led_designs(state: SearchState, end: LocalEnd) -> LocalEnd:
         return end
     tuning, leaders, box = state.tuning, state.sample.leaders, state.sample.box
     place = box.space.points(state.design_at(end))
-    known = (box.space.points(state.design_at(other)) for other in state.feasible)
-    if is_proven(state, end) or any(np.abs(place - other).max() <= tuning.same for other in known):
+    known_points = (box.space.points(state.design_at(other)) for other in state.feasible)
+    if is_proven(state, end) or any(np.abs(place - other).max() <= tuning.same for other in known_points):
         return end  # the search ends here, or an earlier end has the same design
     rows = [row for row in state.left if row != end.start.row]
-    seen, near = leaders.take(np.array(rows, dtype=int)), tuning.same * (end.nlp.size + abs(end.objective))
+    batch, tolerance = leaders.take(np.array(rows, dtype=int)), tuning.same * (end.nlp.size + abs(end.objective))
     if not rows:
         return end
     shares = np.arange(1, 8)[:, None] / 8
-    path = box.judge_points((seen.u[:, None] + shares * (place - seen.u[:, None])).reshape(-1, box.space.size))
+    path = box.judge_points((batch.u[:, None] + shares * (place - batch.u[:, None])).reshape(-1, box.space.size))
     objective, violation = (x.reshape(len(rows), -1) for x in (path.objective, path.violation))
-    gain = seen.objective - end.objective
-    heights = np.concatenate([seen.objective[:, None], objective], axis=1)
-    falls = np.all(heights[:, 1:] <= heights[:, :-1] + (tuning.level * np.abs(gain) + near)[:, None], axis=1)
-    down = falls & (gain >= -near) & np.isfinite(seen.objective) & (violation.max(axis=1) <= seen.violation)
-    down |= (np.abs(gain) <= near) & (seen.violation == 0)
-    return replace(end, led=frozenset(np.array(rows)[down].tolist()))
+    gain = batch.objective - end.objective
+    heights = np.concatenate([batch.objective[:, None], objective], axis=1)
+    falls = np.all(heights[:, 1:] <= heights[:, :-1] + (tuning.level * np.abs(gain) + tolerance)[:, None], axis=1)
+    leads_down = (
+        falls & (gain >= -tolerance) & np.isfinite(batch.objective) & (violation.max(axis=1) <= batch.violation)
+    )
+    leads_down |= (np.abs(gain) <= tolerance) & (batch.violation == 0)
+    return replace(end, led=frozenset(np.array(rows)[leads_down].tolist()))

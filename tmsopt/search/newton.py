@@ -1,4 +1,4 @@
-"""Newton's method for the square systems of equations of a problem, inside the box or outside."""
+"""Newton's method for square systems of equations; solutions may lie outside the box."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -9,17 +9,17 @@ import numpy as np
 from tmsopt.program import NLP
 from tmsopt.records import Array
 
-_STEPS = 60
-_STALLS = 3  # steps without progress before Newton gives up
-_ULPS, _MOVES = 4, 8  # size, in units in the last place, and number of the moves that measure rounding
-_ISOLATED = 1e-9  # ratio of singular values below which the Jacobian counts as singular
+_MAX_STEPS = 60
+_MAX_STALLS = 3  # steps without progress before Newton gives up
+_MOVE_ULPS, _MOVE_COUNT = 4, 8  # size (in units in the last place) and number of the moves that measure rounding
+_SINGULAR = 1e-9  # ratio of smallest to largest singular value below which the Jacobian counts as singular
 
 
 def find_solutions(nlp: NLP, starts: Iterable[Array], mirrored: int) -> Iterator[Array]:
-    """Isolated solutions of an NLP's equations, by damped Newton; there may be more.
+    """Yield isolated solutions of an NLP's equations, found by damped Newton steps; there may be others.
 
-    Newton starts from each start, and from its images with the sign of one of the first `mirrored` variables changed.
-    The same solution may come again. Yields nothing unless the equations are square.
+    The steps begin at each start, and at its images with the sign of one of the first `mirrored` variables changed.
+    A solution may be yielded more than once. Without as many equations as variables, nothing is yielded.
     """
     system = build_square_system(nlp)
     if system is None:
@@ -33,7 +33,7 @@ def find_solutions(nlp: NLP, starts: Iterable[Array], mirrored: int) -> Iterator
 
 
 def build_square_system(nlp: NLP) -> ca.Function | None:
-    """A function x → equations of an NLP and their Jacobian; None unless there are as many as variables."""
+    """Return a function x → (equations of an NLP, their Jacobian); None unless they are as many as the variables."""
     x = ca.SX.sym("x", len(nlp.variables))
     g = nlp.symbolic(x)[1]
     equalities = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
@@ -48,7 +48,7 @@ class Zero:
     """A solution of the equations.
 
     Attributes:
-        isolated: whether their Jacobian is regular there; else there may be a continuum, or two solutions that meet.
+        isolated: whether the Jacobian is regular there; if not, solutions may form a continuum, or two may meet.
     """
 
     x: Array
@@ -56,9 +56,9 @@ class Zero:
 
 
 def find_zero(system: ca.Function, x: Array) -> Zero | None:
-    """A solution of the equations near a point, by damped Newton steps; None if it does not converge."""
+    """Find a solution of the equations near a point by damped Newton steps; None if they do not converge."""
     residual, stalls = np.inf, 0
-    for _ in range(_STEPS):
+    for _ in range(_MAX_STEPS):
         value, jacobian = (np.array(part) for part in system(x))
         if not (np.all(np.isfinite(value)) and np.all(np.isfinite(jacobian))):
             return None
@@ -74,7 +74,7 @@ def find_zero(system: ca.Function, x: Array) -> Zero | None:
             damping /= 2
         else:
             stalls += 1
-            if stalls >= _STALLS:  # with many factors, the residual reaches its rounding before x does
+            if stalls >= _MAX_STALLS:  # with many factors, the residual reaches its rounding error before x does
                 break
         x = x + damping * step
     return Zero(x, _is_regular(jacobian)) if residual <= 1e-11 * (1 + np.abs(x).max()) else None
@@ -86,13 +86,14 @@ def make_zero(system: ca.Function, x: Array) -> Zero:
 
 
 def estimate_error(system: ca.Function, x: Array) -> Array:
-    """Error of each variable of a solution: from the residual of the equations and from their rounding.
+    """Estimate the error of each variable of a solution from the residual of the equations and their rounding error.
 
-    The rounding is measured by moving the solution by a few units in the last place and subtracting the linear change.
-    Sums that swallow a small term hide it, so one unit of the terms is added.
+    The solution is moved by a few units in the last place: what the equations change beyond the linear change is their
+    rounding error. Where a sum swallows a small term, this shows nothing; so one unit of each term is added.
     """
     value, jacobian = (np.array(part) for part in system(x))
-    moves = np.random.default_rng(0).choice([-_ULPS, _ULPS], (_MOVES, len(x))) * np.finfo(float).eps * np.abs(x)
+    units = np.random.default_rng(0).choice([-_MOVE_ULPS, _MOVE_ULPS], (_MOVE_COUNT, len(x)))
+    moves = units * np.finfo(float).eps * np.abs(x)
     noise = [np.abs(np.array(system(x + d)[0]) - value - jacobian @ d[:, None]) for d in moves]
     terms = np.finfo(float).eps * np.abs(jacobian) @ np.abs(x)[:, None]
     residual = np.abs(value) + 2 * np.max(noise, axis=0) + terms
@@ -102,4 +103,4 @@ def estimate_error(system: ca.Function, x: Array) -> Array:
 
 def _is_regular(jacobian: Array) -> bool:
     singular_values = np.linalg.svd(jacobian, compute_uv=False)
-    return bool(singular_values[-1] > _ISOLATED * singular_values[0])
+    return bool(singular_values[-1] > _SINGULAR * singular_values[0])

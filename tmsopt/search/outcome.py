@@ -1,4 +1,4 @@
-"""From the best end of a search to a design with a status."""
+"""Turn the best end of a search into a design with a status."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -21,14 +21,14 @@ from tmsopt.search.newton import find_solutions
 from tmsopt.search.state import CheckedEnd, SearchState
 from tmsopt.search.tuning import Tuning
 
-_MULTIPLIER = 1e-9  # smallest multiplier of an active limit
-_TOUCHES = 1e-10  # of a range: distance of IPOPT from an active bound
+_MIN_MULTIPLIER = 1e-9  # of an active limit
+_AT_BOUND = 1e-10  # of a range: largest distance of IPOPT's end from an active bound
 _BRANCH_STARTS = 12
-_OUTSIDE = 1e-9  # excess above which a limit excludes a solution
-_SAME_BRANCH = 1e-6  # relative difference of parameters
-_STORED = 1e-8  # relative error of a coefficient from rounding parameters on which it depends steeply
-_ZERO = 1e-14  # of the largest root: a smaller one is 0 up to rounding
-_SHARE = 1e-3  # of a range: step that tests whether a0 depends on a parameter
+_LIMIT_EXCESS = 1e-9  # excess above which a limit excludes a solution
+_SAME_BRANCH = 1e-6  # relative difference of parameters up to which two solutions are the same
+_COEFFICIENT_ERROR = 1e-8  # relative, of a coefficient that depends steeply on rounded parameters
+_ZERO_ROOT = 1e-14  # of the largest root: a smaller root is 0 up to rounding
+_A0_STEP = 1e-3  # of a range: step that tests whether a0 depends on a parameter
 
 UNCLEAR = "rounding of the coefficients makes the roots unreliable; keep a0 and the roots away from 0 by constraints"
 UNBOUNDED = (
@@ -43,7 +43,7 @@ class Outcome:
     """A design with its status.
 
     Attributes:
-        cases: the cases that it was checked in.
+        cases: the cases in which the design was checked.
         without_best: whether designs improve without end.
     """
 
@@ -61,29 +61,33 @@ class Outcome:
 
 
 def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None = None) -> Outcome | None:
-    """The best design of a search with its status, in the given cases or those of its program; None if infeasible."""
+    """Return the best design of a search with its status; None if it is infeasible.
+
+    Args:
+        cases: in which the design is checked; by default those of its program.
+    """
     if state.best is None:
         return None
     problem, trial = state.problem, recheck_inside_box(state, state.best)
     parameters, nlp = trial.parameters, trial.end.nlp
     checked = trial.checked if cases is None else recheck(problem, parameters, cases)
-    counted, violated = degrees_of_freedom(problem), bool(checked.violations)
-    if sum(checked.violations.values()) > state.tuning.spurious and counted.count >= 0:
+    freedom, violated = degrees_of_freedom(problem), bool(checked.violations)
+    if sum(checked.violations.values()) > state.tuning.spurious and freedom.count >= 0:
         return None
     notes, status = _find_doubts(problem, trial, checked), "not_converged"
     if not (notes or violated):
-        # No gradient shows an optimum on a plateau.
+        # On a plateau the gradient shows no optimum, but a proven bound does.
         plateau = minimizes_abscissa(problem) and instant_bound(problem, checked.objective).proven
         if has_converged(trial) or plateau:
             status = "optimal"
         else:
             notes = ("feasible, but the solver did not converge: a better design may be close",)
-    if counted.kind == "over-determined" and violated:
+    if freedom.kind == "over-determined" and violated:
         status = "infeasible"
-        surplus = f"{counted.conditions} conditions for {counted.free} free parameters"
-        notes += (f"{surplus} are inconsistent{_suggest_balance(problem, -counted.count)}",)
+        surplus = f"{freedom.conditions} conditions for {freedom.free} free parameters"
+        notes += (f"{surplus} are inconsistent{_suggest_balance(problem, -freedom.count)}",)
     branches: tuple[OtherBranch, ...] = ()
-    if counted.kind == "square":
+    if freedom.kind == "square":
         equations = formulate_matching(problem) if problem.pattern else formulate_by_factors(problem)
         branches = _find_other_branches(problem, nlp if not nlp.kinks else equations, parameters)
     active = _find_active_limits(problem, nlp, trial.point)
@@ -92,7 +96,7 @@ def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None
 
 
 def _find_doubts(problem: Posed, trial: CheckedEnd, checked: Evaluation) -> tuple[str, ...]:
-    """Reasons why a design is no optimum, whatever the solver claims."""
+    """Return reasons why a design does not count as an optimum, whatever the solver claims."""
     if is_unclear(problem, checked):
         return (UNCLEAR,)
     if problem.objective is not None and not math.isfinite(checked.objective):
@@ -109,7 +113,7 @@ def assess_design(problem: Posed, design: Mapping[str, float], note: str = "", f
     """Recheck a design that no search ended at: ``infeasible`` if it violates a limit, else ``not_converged``.
 
     Args:
-        fixed: whether nothing is free, which makes it ``optimal`` instead.
+        fixed: whether no parameter is free; then the design is ``optimal`` instead of ``not_converged``.
     """
     parameters = problem.ordered(design)
     cases = merge_cases(problem, find_worst_cases(problem, parameters) if problem.cases else {})
@@ -118,21 +122,21 @@ def assess_design(problem: Posed, design: Mapping[str, float], note: str = "", f
     return Outcome(parameters, checked, status, {}, Starts(), "none", cases, notes=(note,) if note else ())
 
 
-def _suggest_balance(problem: Posed, short: int) -> str:
-    """How to get as many free parameters as conditions, if something can be freed or dropped."""
-    ways = [f"free {short} more"] if len(problem.fixed) >= short else []
-    ways += ["drop a constraint"] if any(c.equality for c in problem.conditions.values()) else []
-    return f"; {', or '.join(ways)}" if ways else ""
+def _suggest_balance(problem: Posed, missing_count: int) -> str:
+    """Suggest how to get as many free parameters as conditions; empty if no change can do that."""
+    suggestions = [f"free {missing_count} more"] if len(problem.fixed) >= missing_count else []
+    suggestions += ["drop a constraint"] if any(c.equality for c in problem.conditions.values()) else []
+    return f"; {', or '.join(suggestions)}" if suggestions else ""
 
 
 def write_mass_advice(problem: Posed) -> str:
     """Advise how to keep the mass matrix regular, in the names of the model."""
-    known = {"tms": "nu_H and zeta_B", "whipple": "mass_margin"}
-    return f"keep {known.get(problem.model.name, 'a0')} away from 0 by a constraint"
+    quantities = {"tms": "nu_H and zeta_B", "whipple": "mass_margin"}
+    return f"keep {quantities.get(problem.model.name, 'a0')} away from 0 by a constraint"
 
 
 def choose_outcome(problem: Posed, outcomes: Sequence[Outcome | None], tuning: Tuning) -> Outcome | None:
-    """The best outcome; None if there is none."""
+    """Return the best outcome; None if there is none."""
     best: Outcome | None = None
     for outcome in outcomes:
         if outcome and (best is None or _is_better(problem, outcome, best, tuning)):
@@ -140,10 +144,10 @@ def choose_outcome(problem: Posed, outcomes: Sequence[Outcome | None], tuning: T
     return best
 
 
-def _is_better(problem: Posed, one: Outcome, other: Outcome, tuning: Tuning) -> bool:
-    """Whether one outcome beats another: feasible first, then by objective, then optimal first."""
-    a, b = (problem.sign * outcome.checked.objective for outcome in (one, other))
-    sound = not (one.checked.violations or other.checked.violations)
+def _is_better(problem: Posed, candidate: Outcome, other: Outcome, tuning: Tuning) -> bool:
+    """Whether an outcome beats another: by feasibility, then by the objective, then by the status ``optimal``."""
+    a, b = (problem.sign * outcome.checked.objective for outcome in (candidate, other))
+    sound = not (candidate.checked.violations or other.checked.violations)
     if sound and math.isfinite(a) and math.isfinite(b) and not math.isclose(a, b, rel_tol=tuning.claimed):
         return a < b
 
@@ -151,37 +155,38 @@ def _is_better(problem: Posed, one: Outcome, other: Outcome, tuning: Tuning) -> 
         doubtful = bool(outcome.checked.violations) or math.isinf(value)
         return doubtful, outcome.status != "optimal", value if math.isfinite(value) else 0.0
 
-    return rank(one, a) < rank(other, b)
+    return rank(candidate, a) < rank(other, b)
 
 
 def is_unclear(problem: Posed, checked: Evaluation) -> bool:
-    """Whether the stored roots are farther from the multiple ones than an m-th root of the rounding explains.
+    """Whether rounding makes the roots unreliable.
 
-    Also if a damping ratio is asked for and several roots are 0 up to rounding, because they have none.
+    This is so if the roots of the stored numbers are farther from an m-fold root than the m-th root of the rounding
+    error; also if the problem uses damping ratios and several roots are 0 up to rounding, which have no damping ratio.
     """
     roots = checked.structure.roots
     if not roots or not math.isfinite(checked.realised):
         return False
     sizes = sorted(r.size for r in roots)
-    asked = any("damping_ratio" in e.names for e in (problem.objective, *problem.conditions.values()) if e)
-    if asked and any(r.multiplicity > 1 and 0 < r.size < _ZERO * sizes[-1] for r in roots):
+    uses_damping = any("damping_ratio" in e.names for e in (problem.objective, *problem.conditions.values()) if e)
+    if uses_damping and any(r.multiplicity > 1 and 0 < r.size < _ZERO_ROOT * sizes[-1] for r in roots):
         return True
-    each = (r.size * _STORED ** (1 / r.multiplicity) for r in roots)
-    scatter = max(each) + _ZERO * sizes[-1]
+    errors = (r.size * _COEFFICIENT_ERROR ** (1 / r.multiplicity) for r in roots)
+    scatter = max(errors) + _ZERO_ROOT * sizes[-1]
     return bool(abs(checked.structure.abscissa - checked.realised) > scatter)
 
 
 def _find_active_limits(problem: Posed, nlp: NLP, point: Point) -> dict[str, float]:
-    """Gain of the objective per unit by which each active constraint or bound is relaxed.
+    """Return how much the objective gains per unit by which each active constraint or bound is relaxed.
 
-    For an equality constraint: the change of the objective per unit added to its right-hand side. For a constraint that
-    holds in several cases: the gain of relaxing it in all of them.
+    For an equality constraint, this is the change of the objective per unit added to its right-hand side. A constraint
+    that is active in several cases is relaxed in all of them.
     """
     if problem.objective is None:
         return {}
     gain, active, inequalities = relaxation_gain(nlp, point), dict[str, float](), dict[str, list[int]]()
     for k, (row, multiplier) in enumerate(zip(nlp.rows, point.row_multipliers.tolist(), strict=True)):
-        if row in problem.constraints and abs(multiplier) > _MULTIPLIER:
+        if row in problem.constraints and abs(multiplier) > _MIN_MULTIPLIER:
             if nlp.row_lower[k] == nlp.row_upper[k]:
                 active[row] = active.get(row, 0.0) - problem.sign * multiplier
             else:
@@ -190,24 +195,25 @@ def _find_active_limits(problem: Posed, nlp: NLP, point: Point) -> dict[str, flo
     for k, (name, ends) in enumerate(problem.free.items()):
         x, tangent = float(point.x[k]), problem.parameter_set[name].tangent
         lower, upper = (float(np.tan(end)) if tangent else end for end in ends)
-        below, above = abs(x - lower), abs(x - upper)
-        at_end = min(below, above) <= _TOUCHES * (upper - lower)  # 0 may bound a part of the box only
-        if abs(point.bound_multipliers[k]) > _MULTIPLIER and at_end:
+        lower_gap, upper_gap = abs(x - lower), abs(x - upper)
+        # The end 0 may only separate two parts of the box; then it is no bound.
+        at_end = min(lower_gap, upper_gap) <= _AT_BOUND * (upper - lower)
+        if abs(point.bound_multipliers[k]) > _MIN_MULTIPLIER and at_end:
             slope = 1 + x * x if tangent else 1.0  # d tan λ/dλ
-            active[f"{name}.{'max' if above < below else 'min'}"] = gain([len(nlp.rows) + k]) * slope
+            active[f"{name}.{'max' if upper_gap < lower_gap else 'min'}"] = gain([len(nlp.rows) + k]) * slope
     return active
 
 
-def _find_other_branches(problem: Posed, nlp: NLP, found: Mapping[str, float]) -> tuple[OtherBranch, ...]:
-    """Other solutions of the equations, each with the bounds and rows that it violates."""
+def _find_other_branches(problem: Posed, nlp: NLP, design: Mapping[str, float]) -> tuple[OtherBranch, ...]:
+    """Find other solutions of the equations, each with the bounds and rows that it violates."""
     branches, names = list[OtherBranch](), list(problem.free)
     tangent = [problem.parameter_set[n].tangent for n in names]
-    known = [np.array([found[n] for n in names])]
+    known_branches = [np.array([design[n] for n in names])]
     starts = (initial_point(nlp, problem, start) for start in choose_starts(problem, 0, _BRANCH_STARTS))
     for x in find_solutions(nlp, starts, len(names)):
         values = np.where(tangent, np.arctan(x[: len(names)]), x[: len(names)])
-        if all(np.abs(values - k).max() > _SAME_BRANCH * (1 + np.abs(k).max()) for k in known):
-            known.append(values)
+        if all(np.abs(values - k).max() > _SAME_BRANCH * (1 + np.abs(k).max()) for k in known_branches):
+            known_branches.append(values)
             parameters = problem.ordered(dict(zip(names, values.tolist(), strict=True)))
             branches.append(OtherBranch(Table(parameters), _find_violated_limits(problem, nlp, x)))
     return tuple(sorted(branches, key=lambda b: len(b.excluded_by)))
@@ -216,16 +222,20 @@ def _find_other_branches(problem: Posed, nlp: NLP, found: Mapping[str, float]) -
 def _find_violated_limits(problem: Posed, nlp: NLP, x: Array) -> tuple[str, ...]:
     """Names of the bounds and inequality rows that a solution violates."""
     values, size, names = np.array([*x, *nlp.evaluate(x)[1]]), len(problem.free), dict[str, None]()
-    below = values < np.array([*nlp.lower, *nlp.row_lower]) - _OUTSIDE
-    outside = below | (values > np.array([*nlp.upper, *nlp.row_upper]) + _OUTSIDE)
-    every = (*problem.free, *nlp.variables[size:], *nlp.rows)
+    is_below = values < np.array([*nlp.lower, *nlp.row_lower]) - _LIMIT_EXCESS
+    outside = is_below | (values > np.array([*nlp.upper, *nlp.row_upper]) + _LIMIT_EXCESS)
+    limit_names = (*problem.free, *nlp.variables[size:], *nlp.rows)
     for k in np.flatnonzero(outside).tolist():
-        names[every[k] if k >= size else f"{every[k]}.{'min' if below[k] else 'max'}"] = None
+        names[limit_names[k] if k >= size else f"{limit_names[k]}.{'min' if is_below[k] else 'max'}"] = None
     return tuple(names)
 
 
 def demote_if_unbounded(state: SearchState, outcome: Outcome) -> Outcome:
-    """Demote an optimum with a root almost at infinity that no active limit prevents; note an unbounded objective."""
+    """Demote an optimum where the objective has no best value; otherwise return the outcome as it is.
+
+    This is so if a root is almost at infinity and no active limit stops it there. If the objective seems unbounded, the
+    note of an outcome that is not ``optimal`` says so.
+    """
     problem, value = state.problem, state.problem.sign * outcome.checked.objective
     if problem.objective is None or outcome.checked.violations:
         return outcome
@@ -233,30 +243,30 @@ def demote_if_unbounded(state: SearchState, outcome: Outcome) -> Outcome:
         if outcome.status == "optimal":
             return outcome
         return replace(outcome, without_best=True, notes=(UNBOUNDED,))
-    runaway = has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway)
-    if outcome.status != "optimal" or not runaway or _is_a0_limited(problem, outcome):
+    has_runaway = has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway)
+    if outcome.status != "optimal" or not has_runaway or _is_a0_limited(problem, outcome):
         return outcome
     note = f"no best design: it improves towards a singular mass matrix (a0 = 0); {write_mass_advice(problem)}"
     return replace(outcome, status="not_converged", without_best=True, notes=(*outcome.notes, note))
 
 
 def demote_if_beaten(state: SearchState, outcome: Outcome) -> Outcome:
-    """Replace an optimum by the design of an end that beats it, also in the worst cases of that design."""
+    """Replace an optimum by the design of another end if that is better, even in its own worst cases."""
     problem, tuning = state.problem, state.tuning
     if outcome.status != "optimal" or state.sample is None or problem.objective is None:
         return outcome
     box, objective = state.sample.box, problem.sign * outcome.checked.objective
-    least = objective - tuning.lost * (state.nlp.size + abs(objective))
+    threshold = objective - tuning.lost * (state.nlp.size + abs(objective))
     points = np.array([box.space.points(design) for design in state.designs]).reshape(-1, box.space.size)
-    apart = np.abs(points - box.space.points(outcome.parameters)).max(axis=1, initial=0.0) > tuning.same_design
-    rivals = box.judge_points(points[apart]).select_better(least).take_best(tuning.rivals_seen)
+    is_distinct = np.abs(points - box.space.points(outcome.parameters)).max(axis=1, initial=0.0) > tuning.same_design
+    rivals = box.judge_points(points[is_distinct]).select_better(threshold).take_best(tuning.rivals_seen)
     for design in box.designs(rivals):
-        other = assess_design(problem, design, BEATEN)
-        checked = other.checked
-        merged = abs(checked.structure.abscissa - checked.realised)  # an abscissa that merged roots may gain
+        rival = assess_design(problem, design, BEATEN)
+        checked = rival.checked
+        merging_gain = abs(checked.structure.abscissa - checked.realised)  # possible if several roots count as one
         sound = not checked.violations and not is_unclear(problem, checked)
-        if sound and problem.sign * checked.objective < least - merged:
-            return replace(other, starts=outcome.starts, formulation=outcome.formulation)
+        if sound and problem.sign * checked.objective < threshold - merging_gain:
+            return replace(rival, starts=outcome.starts, formulation=outcome.formulation)
     return outcome
 
 
@@ -267,23 +277,23 @@ def has_runaway_root(roots: Sequence[Root], ratio: float) -> bool:
 
 
 def _is_a0_limited(problem: Posed, outcome: Outcome) -> bool:
-    """Whether no free parameter moves a0, or an active limit is on one that does."""
-    limited = set[str]()
+    """Whether no free parameter changes a0, or an active limit uses a parameter that does."""
+    limited_names = set[str]()
     for name in outcome.active:
         condition = problem.conditions.get(name)
-        limited |= set(condition.names) if condition else {name.rpartition(".")[0]}
+        limited_names |= set(condition.names) if condition else {name.rpartition(".")[0]}
 
     def moves_a0(name: str) -> bool:
         low, high = problem.free[name]
-        moved = {**outcome.parameters, name: outcome.parameters[name] + _SHARE * (high - low)}
-        one, other = (float(problem.values(p).coefficients[0]) for p in (outcome.parameters, moved))
-        return one != other
+        moved_design = {**outcome.parameters, name: outcome.parameters[name] + _A0_STEP * (high - low)}
+        a0, moved_a0 = (float(problem.values(p).coefficients[0]) for p in (outcome.parameters, moved_design))
+        return a0 != moved_a0
 
-    moving = set(filter(moves_a0, problem.free))
+    a0_parameters = set(filter(moves_a0, problem.free))
     # A quantity may depend on every parameter.
-    return not moving or bool(limited & moving or limited - set(problem.free))
+    return not a0_parameters or bool(limited_names & a0_parameters or limited_names - set(problem.free))
 
 
 def merge_cases(problem: Posed, worst: Mapping[str, Worst]) -> tuple[Case, ...]:
-    """The listed cases and the worst ones found."""
+    """Return the listed cases and the worst cases."""
     return (*problem.cases, *(w.case for w in worst.values())) if problem.cases else ()

@@ -1,4 +1,4 @@
-"""The search as a policy: sample, starts, local search, acceptance, stopping rule and rescues; `search` is the loop.
+"""The loop of a search, `search`, and its stages as a `Policy`: sample, starts, local search, acceptance, rescues.
 
 Each stage is a function of the `SearchState` and can be replaced: ``tmsopt.solve(problem, policy=replace(POLICY,
 enough=mine))``.
@@ -20,13 +20,13 @@ from tmsopt.search.tuning import TUNING, Tuning
 
 @dataclass(frozen=True)
 class Rescue:
-    """A stage that runs after the loop, where the loop alone ends at a wrong design or at none.
+    """A stage that runs after the loop, for problems on which the loop alone ends at a wrong design or at none.
 
     Attributes:
-        name: for `Policy.without`.
-        evidence: benchmark suites that get worse without it, with the number of problems.
-        applies: whether it runs in this state.
-        run: continues the search, with the policy for its starts.
+        name: the name to give to `Policy.without`.
+        evidence: benchmark suites with the number of problems that get worse without this rescue.
+        applies: tells whether the rescue runs in this state.
+        run: continues the search; it gets the policy too.
 
     Example:
         >>> [rescue.name for rescue in tmsopt.POLICY.rescues][-1]
@@ -50,9 +50,9 @@ class Policy:
         starts: yields designs to start from.
         local: solves from one start, by IPOPT on the program of the state.
         accept: adds the best end to the state, polished and rechecked.
-        enough: whether to stop; called after each start, with the ends on the same program. Rescues with few starts
-            and added cases try all their starts.
-        rescues: in the order in which they run.
+        enough: tells whether to stop; called after each start, with the ends on the same program. It is not asked by
+            rescues that have few starts, nor after cases were added: these try all their starts.
+        rescues: stages after the loop, in the order in which they run.
         tuning: the numbers that the stages use.
 
     Example:
@@ -93,13 +93,13 @@ def check_policy(policy: Any) -> None:
     if not isinstance(policy, Policy):
         raise input_error(f"found {short(policy)}; accepted: a tmsopt.Policy, such as tmsopt.POLICY", "policy")
     stages = {name: getattr(policy, name) for name in ("sample", "starts", "local", "accept", "enough")}
-    wrong = {name: stage for name, stage in stages.items() if not callable(stage)}
-    if faults := [Fault(f"found {short(x)}; accepted: a function", ("policy", name)) for name, x in wrong.items()]:
+    invalid_stages = {name: stage for name, stage in stages.items() if not callable(stage)}
+    if faults := [Fault(f"found {short(x)}; accepted: a function", ("policy", n)) for n, x in invalid_stages.items()]:
         raise InputError(faults)
 
 
 def search(state: SearchState, policy: Policy) -> SearchState:
-    """Search one part of the box; if the user stops it, return what was found so far."""
+    """Search one part of the box; if the user stops the search, return its state so far."""
     try:
         begin(state.options.progress, "looking at designs")
         state = replace(state, tuning=policy.tuning)
@@ -114,45 +114,51 @@ def search(state: SearchState, policy: Policy) -> SearchState:
     return state
 
 
-def try_starts(state: SearchState, starts: Iterable[Start], policy: Policy, most: int = 0) -> SearchState:
-    """Solve from these starts until there are enough ends."""
-    most = most or state.options.starts
-    whole = (replace(start, design={**default_start(state.part), **start.design}) for start in starts)
+def try_starts(state: SearchState, starts: Iterable[Start], policy: Policy, max_starts: int = 0) -> SearchState:
+    """Solve from these starts until the policy says that the ends are enough, or after `max_starts`."""
+    max_starts = max_starts or state.options.starts
+    full_starts = (replace(start, design={**default_start(state.part), **start.design}) for start in starts)
     try:
-        for tried, start in enumerate((s for s in whole if not any(s.row in end.led for end in state.ends)), start=1):
+        new_starts = (s for s in full_starts if not any(s.row in end.led for end in state.ends))
+        for start_count, start in enumerate(new_starts, start=1):
             state = replace(state, ends=(*state.ends, policy.local(state, start)))
             if state.options.progress:
-                state.options.progress(tried, most, state.so_far)
-            if tried >= most or (not state.options.exhaustive and policy.enough(state)):
+                state.options.progress(start_count, max_starts, state.so_far)
+            if start_count >= max_starts or (not state.options.exhaustive and policy.enough(state)):
                 break
     except KeyboardInterrupt:
         state = replace(state, interrupted=True)
     return state
 
 
-def run_nested(state: SearchState, starts: Iterable[Start], policy: Policy, most: int = 0) -> SearchState:
+def run_nested(state: SearchState, starts: Iterable[Start], policy: Policy, max_starts: int = 0) -> SearchState:
     """Solve from these starts inside another search, and accept the best end.
 
     Raises:
         KeyboardInterrupt: if the user stops it, so that the outer search stops too.
     """
-    state = try_starts(state, starts, policy, most)
+    state = try_starts(state, starts, policy, max_starts)
     if state.interrupted:
         raise KeyboardInterrupt
     return policy.accept(state)
 
 
 def search_again(
-    state: SearchState, policy: Policy, starts: Iterable[Start] | None = None, nlp: NLP | None = None, most: int = 0
+    state: SearchState,
+    policy: Policy,
+    starts: Iterable[Start] | None = None,
+    nlp: NLP | None = None,
+    max_starts: int = 0,
 ) -> SearchState:
     """Solve from more starts, possibly on another program; add their ends and keep the better design."""
-    own = state.with_program(nlp or state.nlp)
-    own = policy.accept(try_starts(own, policy.starts(own) if starts is None else starts, policy, most))
-    ends = (*state.ends, *own.ends)
-    better = own.best and (state.best is None or is_better(state.problem, own.best, state.best))
+    new_state = state.with_program(nlp or state.nlp)
+    starts = policy.starts(new_state) if starts is None else starts
+    new_state = policy.accept(try_starts(new_state, starts, policy, max_starts))
+    ends = (*state.ends, *new_state.ends)
+    better = new_state.best and (state.best is None or is_better(state.problem, new_state.best, state.best))
     if better:
-        state = replace(own, fallback=None)
-    return replace(state, ends=ends, accepted=len(ends), interrupted=own.interrupted)
+        state = replace(new_state, fallback=None)
+    return replace(state, ends=ends, accepted=len(ends), interrupted=new_state.interrupted)
 
 
 def disable_stopping(policy: Policy) -> Policy:

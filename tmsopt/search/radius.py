@@ -1,4 +1,8 @@
-"""Designs of largest robustness radius: climb via the nearest boundary points from the best designs of a sample."""
+"""Find designs of largest robustness radius: climb from the best designs of a sample.
+
+The radius of a design is its distance to the nearest point on a boundary of stability. A climb maximises the distance
+to the boundary points known so far, then adds the nearest points of the new design, and repeats this.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -24,26 +28,29 @@ from tmsopt.search.tuning import Tuning
 
 
 def climb(state: SearchState, start: Start) -> LocalEnd:
-    """Climb from one design: add the nearest boundary points and solve again; an infeasible end if that fails."""
+    """Climb from one design: add the nearest boundary points and solve again, until the radius is the one claimed.
+
+    The end is infeasible if that fails.
+    """
     problem, design, points = state.problem, start.design, list[Case]()
-    listed = tuple(case for case in problem.cases if not case.direction)
-    around: Robustness | None = find_stability_margins(problem, problem.ordered(design))
+    listed_cases = tuple(case for case in problem.cases if not case.direction)
+    margins: Robustness | None = find_stability_margins(problem, problem.ordered(design))
     end = make_failed_end(start, state.nlp)
     for _ in range(state.tuning.climb_rounds):
-        if around is None or not around.stable or _has_other_weights(problem, around):
+        if margins is None or not margins.stable or _has_other_weights(problem, margins):
             break
-        points = _add_boundary_points(problem, points, around, state.tuning)
+        points = _add_boundary_points(problem, points, margins, state.tuning)
         if not points:
             break
-        nlp = formulate(state.part, (*listed, *points))
+        nlp = formulate(state.part, (*listed_cases, *points))
         end = solve_from(replace(state, nlp=nlp), replace(start, design=design, near=True))
         if not end.feasible:
             break
         trial = check_end(state, end)
         if trial.checked.violations:
             break
-        claimed, around = float(trial.point.x[nlp.variables.index(RADIUS)]), trial.checked.robustness
-        if around is not None and around.radius >= claimed * (1 - state.tuning.exact_radius):
+        claimed_radius, margins = float(trial.point.x[nlp.variables.index(RADIUS)]), trial.checked.robustness
+        if margins is not None and margins.radius >= claimed_radius * (1 - state.tuning.exact_radius):
             return end
         design = trial.parameters
         points = [_move_point(case, k, trial) for k, case in enumerate(nlp.cases, start=1) if case.edge]
@@ -51,30 +58,30 @@ def climb(state: SearchState, start: Start) -> LocalEnd:
 
 
 def propose_climbs(state: SearchState) -> Iterator[Start]:
-    """The caller's designs; or else designs that lie apart, those with the largest radius along some rays first."""
+    """Yield the caller's designs; without any, sampled designs that lie apart, by falling estimates of the radius."""
     problem, tuning = state.part, state.tuning
     yield from (Start(design) for design in state.extra)
     if state.extra:
         return
     limits = {name: text for name, text in problem.constraints.items() if RADIUS not in problem.conditions[name].names}
-    asked = problem.derive(minimize="abscissa", maximize=None, constraints=limits)
+    abscissa_problem = problem.derive(minimize="abscissa", maximize=None, constraints=limits)
     if problem.start or state.options.near:
         yield Start(state.options.near or {})
-    box = draw_box(asked, state.options.seed, tuning)
-    seen = box.draws.take_best(2 * tuning.estimated)
-    if np.sum(seen.violation == 0) < tuning.estimated // 4:
-        seen = seen.join(box.approach_limits(seen.take_first(tuning.estimated // 2)))
-        seen = seen.take(seen.order)
-    seen = seen.take(np.flatnonzero(seen.objective < 0)[: tuning.estimated])
-    if not len(seen):
+    box = draw_box(abscissa_problem, state.options.seed, tuning)
+    batch = box.draws.take_best(2 * tuning.estimated)
+    if np.sum(batch.violation == 0) < tuning.estimated // 4:
+        batch = batch.join(box.approach_limits(batch.take_first(tuning.estimated // 2)))
+        batch = batch.take(batch.order)
+    batch = batch.take(np.flatnonzero(batch.objective < 0)[: tuning.estimated])
+    if not len(batch):
         return
-    radii = estimate_radii(problem, box.space.designs(seen.u), state.options.seed)
-    ranked = seen.take(np.lexsort((-radii, seen.violation)))
+    radii = estimate_radii(problem, box.space.designs(batch.u), state.options.seed)
+    ranked = batch.take(np.lexsort((-radii, batch.violation)))
     yield from (Start(design) for design in box.designs(ranked.select_apart(tuning.climbs, tuning.apart)))
 
 
 def has_enough_climbs(state: SearchState) -> bool:
-    """Whether enough climbs ended, and two of them at the best radius."""
+    """Whether enough climbs succeeded, and at least two of them ended at the best radius."""
     feasible = state.feasible
     best = min((end.objective for end in feasible), default=np.inf)
     return len(feasible) >= state.tuning.fewest_climbs and count_starts(feasible, best).at_best >= 2
@@ -83,49 +90,53 @@ def has_enough_climbs(state: SearchState) -> bool:
 RADIUS_POLICY = Policy(lambda _: None, propose_climbs, climb, accept_best, has_enough_climbs)
 
 
-def _has_other_weights(problem: Posed, around: Robustness) -> bool:
-    """Whether a radius is measured by other weights than the problem's, as where a parameter is 0."""
-    return any(weight != weight_of(n, around.parameters[n], problem.weights) for n, weight in around.weights.items())
+def _has_other_weights(problem: Posed, margins: Robustness) -> bool:
+    """Whether a radius is measured with weights other than the problem's, for example because a parameter is 0."""
+    return any(weight != weight_of(n, margins.parameters[n], problem.weights) for n, weight in margins.weights.items())
 
 
-def _add_boundary_points(problem: Posed, points: list[Case], around: Robustness, tuning: Tuning) -> list[Case]:
-    """The boundary points so far, and the new ones of a design."""
-    found = list(points)
-    for nearest in (around.weave, around.capsize, around.infinity):
-        # In all parameters that the radius varies, also those that are 0 in the design.
+def _add_boundary_points(problem: Posed, points: list[Case], margins: Robustness, tuning: Tuning) -> list[Case]:
+    """Return the boundary points so far, and those near a design that are new."""
+    cases = list(points)
+    for nearest in (margins.weave, margins.capsize, margins.infinity):
+        # The direction has all parameters that the radius varies, also those that are 0 in the design.
         direction = Table({n: nearest.direction.get(n, 0.0) for n in _list_varied(problem)})
         case = Case(direction=direction, edge=nearest.kind)
-        near = nearest.distance <= tuning.beyond * around.radius
-        if near and not any(_is_alike(case, other, tuning.alike_points) for other in points):
-            found.append(case)
-    return found
+        is_near = nearest.distance <= tuning.beyond * margins.radius
+        if is_near and not any(_is_alike(case, other, tuning.alike_points) for other in points):
+            cases.append(case)
+    return cases
 
 
-def _is_alike(one: Case, other: Case, share: float) -> bool:
-    u, v = (np.array(list(case.direction.values())) for case in (one, other))
-    return one.edge == other.edge and bool(np.linalg.norm(u - v) <= share * np.linalg.norm(u))
+def _is_alike(first: Case, second: Case, share: float) -> bool:
+    u, v = (np.array(list(case.direction.values())) for case in (first, second))
+    return first.edge == second.edge and bool(np.linalg.norm(u - v) <= share * np.linalg.norm(u))
 
 
 def _move_point(case: Case, k: int, trial: CheckedEnd) -> Case:
-    """A boundary point moved to where it is at a trial."""
+    """Return a boundary point at the place that a trial gives to it."""
     nlp = trial.end.nlp
-    at = {n: float(trial.point.x[nlp.variables.index(f"{n}.{k}")]) for n in case.direction}
-    return replace(case, direction=Table(at))
+    point = {n: float(trial.point.x[nlp.variables.index(f"{n}.{k}")]) for n in case.direction}
+    return replace(case, direction=Table(point))
 
 
 def estimate_radii(problem: Posed, columns: Mapping[str, Array], seed: int) -> Array:
-    """Upper estimates of the radii of designs, columns of free parameters: how far they stay stable along some rays."""
+    """Estimate the radii of designs from above: how far the designs stay stable along some rays.
+
+    Args:
+        columns: free parameters of the designs, an array for each name.
+    """
     names, steps = _list_varied(problem), np.geomspace(5e-3, 1.5, 20)
     random = stream(seed, "rays").standard_normal((24, len(names)))
     rays = np.concatenate([np.eye(len(names)), random / np.linalg.norm(random, axis=1, keepdims=True)])
-    reached = []
+    radii = []
     for ray in (*rays, *-rays):
         case = Case(direction=dict(zip(names, ray.tolist(), strict=True)))
         changed = case.applied(problem.ordered(columns), steps[:, None], problem.weights)
         a = np.broadcast_arrays(*coefficients_of(problem, changed), *changed.values())[: problem.model.degree + 1]
-        lost = ~is_stable(np.stack(a, axis=-1), exact=False)
-        reached.append(steps[np.where(lost.any(axis=0), lost.argmax(axis=0), len(steps) - 1)])
-    return np.asarray(np.min(reached, axis=0) + 1e-3 * np.mean(reached, axis=0))
+        is_unstable = ~is_stable(np.stack(a, axis=-1), exact=False)
+        radii.append(steps[np.where(is_unstable.any(axis=0), is_unstable.argmax(axis=0), len(steps) - 1)])
+    return np.asarray(np.min(radii, axis=0) + 1e-3 * np.mean(radii, axis=0))
 
 
 def _list_varied(problem: Posed) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Rescues: extra stages for problems on which the loop alone ends at a wrong design or at none.
 
-Each one starts from other designs or on another program, and returns to the same loop.
+Each rescue starts from other designs or on another program, and uses the stages of the same policy.
 """
 
 import math
@@ -27,37 +27,44 @@ from tmsopt.search.stopping import select_distinct_ends
 
 
 def search_real_roots(state: SearchState, policy: Policy) -> SearchState:
-    """Search with all roots real; start from designs of least abscissa with one multiple root, if there are any."""
+    """Search with all roots real; start from designs of least abscissa whose roots all coincide, if there are any."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=1.0)
-    if leads := find_multiple_roots(state, policy):
-        return search_again(search_again(state, disable_stopping(policy), leads), disable_stopping(policy), leads, nlp)
-    return search_again(state, policy, nlp=nlp, most=state.tuning.fewer)
+    if starts := find_multiple_roots(state, policy):
+        return search_again(
+            search_again(state, disable_stopping(policy), starts), disable_stopping(policy), starts, nlp
+        )
+    return search_again(state, policy, nlp=nlp, max_starts=state.tuning.fewer)
 
 
 def find_multiple_roots(state: SearchState, policy: Policy) -> list[Start]:
-    """Designs of least abscissa with one root, or one pair, of full multiplicity, found from their equations."""
-    part, tuning, leads = state.part, state.tuning, list[Start]()
+    """Find designs of least abscissa whose roots all coincide, in one root or one pair, from their equations."""
+    part, tuning, starts = state.part, state.tuning, list[Start]()
     limits = {name: text for name, text in part.constraints.items() if name not in part.asked_of_roots}
-    free = {"minimize": "abscissa", "maximize": None, "constraints": limits, "scenarios": {}, "tolerances": {}}
-    few = replace(
+    changes = {"minimize": "abscissa", "maximize": None, "constraints": limits, "scenarios": {}, "tolerances": {}}
+    short_policy = replace(
         policy,
-        local=lambda own, start: run_once(own, start, "far"),
-        enough=lambda own: len(own.ends) >= tuning.leadless or bool(own.feasible),
+        local=lambda pattern_state, start: run_once(pattern_state, start, "far"),
+        enough=lambda pattern_state: len(pattern_state.ends) >= tuning.leadless or bool(pattern_state.feasible),
     )
     for pattern in full_patterns(part.model) if state.sample and not state.options.near else ():
-        asked = part.derive(locate=pattern, **free)
-        if degrees_of_freedom(asked).count >= 0 and state.sample:
-            own = replace(state.with_program(formulate_matching(asked)), problem=asked, part=asked)
-            own = try_starts(own, propose_sample_starts(state.sample), few)
-            leads += [Start(state.design_at(end)) for end in select_distinct_ends(own.ends)[: tuning.leads]]
-    return leads
+        pattern_problem = part.derive(locate=pattern, **changes)
+        if degrees_of_freedom(pattern_problem).count >= 0 and state.sample:
+            pattern_state = replace(
+                state.with_program(formulate_matching(pattern_problem)), problem=pattern_problem, part=pattern_problem
+            )
+            pattern_state = try_starts(pattern_state, propose_sample_starts(state.sample), short_policy)
+            starts += [Start(state.design_at(end)) for end in select_distinct_ends(pattern_state.ends)[: tuning.leads]]
+    return starts
 
 
 def can_have_positive_roots(state: SearchState) -> bool:
-    """Whether the best design may have a positive real root, whose damping ratio −1 belongs to no sector."""
+    """Whether the best design may have a positive real root, which has the damping ratio −1.
+
+    If the damping ratio is a variable, the factors of the program keep all roots in a sector, which excludes this one.
+    """
     if "damping_ratio" not in state.nlp.variables:
         return False
-    if state.best is None or "damping_ratio" in state.nlp.contacts:  # the less of it the better, somewhere
+    if state.best is None or "damping_ratio" in state.nlp.contacts:  # then a smaller damping ratio may be better
         return True
     goal = state.problem.objective
     return not (goal and "damping_ratio" in goal.names) and state.best.checked.structure.abscissa > 0
@@ -66,11 +73,11 @@ def can_have_positive_roots(state: SearchState) -> bool:
 def search_positive_roots(state: SearchState, policy: Policy) -> SearchState:
     """Search with a damping ratio of −1, without a sector."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=-1.0)
-    few = (state.best and state.nlp.contacts) or (state.problem.sense, state.problem.goal) == (
+    few_starts = (state.best and state.nlp.contacts) or (state.problem.sense, state.problem.goal) == (
         "maximize",
         "damping_ratio",
     )
-    return search_again(state, policy, nlp=nlp, most=state.tuning.fewer if few else 0)
+    return search_again(state, policy, nlp=nlp, max_starts=state.tuning.fewer if few_starts else 0)
 
 
 def has_only_crossings(state: SearchState) -> bool:
@@ -80,7 +87,7 @@ def has_only_crossings(state: SearchState) -> bool:
 
 
 def search_other_chains(state: SearchState, policy: Policy) -> SearchState:
-    """Search for exceptional points from other starts, if the point nearest to the first start is only a crossing."""
+    """Search for exceptional points from other starts, as the one nearest to the first start is only a crossing."""
     part = state.part
     for design in choose_starts(part, state.options.seed, state.tuning.chains):
         nlp = formulate_matching(part.derive(minimize=None, maximize=None, start=design))
@@ -94,7 +101,7 @@ def search_other_chains(state: SearchState, policy: Policy) -> SearchState:
 
 
 def find_rivals(state: SearchState) -> DesignBatch | None:
-    """Designs of the sample and near the best end that are better than the best end, the best first."""
+    """Find designs that are better than the best end, in the sample and near that end; the best comes first."""
     if state.sample is None:
         return None
     rivals = state.sample.refined
@@ -103,81 +110,83 @@ def find_rivals(state: SearchState) -> DesignBatch | None:
     return rivals.select_better(compute_threshold(state))
 
 
-def compute_threshold(state: SearchState, lost: float | None = None) -> float:
-    """The objective below which a design is better than the best end."""
-    best, lost = state.best, state.tuning.lost if lost is None else lost
+def compute_threshold(state: SearchState, tolerance: float | None = None) -> float:
+    """Return the objective below which a design is better than the best end; inf without a feasible best end."""
+    best, tolerance = state.best, state.tuning.lost if tolerance is None else tolerance
     if best is None or best.checked.violations:
         return math.inf
     objective = state.problem.sign * best.checked.objective
-    return objective - lost * (best.end.nlp.size + abs(objective)) if math.isfinite(objective) else math.inf
+    return objective - tolerance * (best.end.nlp.size + abs(objective)) if math.isfinite(objective) else math.inf
 
 
 def restart_from_rivals(state: SearchState, policy: Policy) -> SearchState:
-    """Start from designs that are better than the best end, as long as that helps."""
+    """Start from designs that are better than the best end, and repeat this while it helps."""
     for _ in range(state.tuning.appeals):
         rivals = find_rivals(state)
         if not rivals or not state.sample:
             break
-        before = state.best
+        previous_best = state.best
         starts = (Start(design) for design in state.sample.box.designs(rivals.take_best(state.tuning.rivals_seen)))
         state = search_again(state, disable_stopping(policy), starts)
-        if state.best is before:
+        if state.best is previous_best:
             break
     return state
 
 
 def has_doubtful_claim(state: SearchState) -> bool:
-    """Whether an end claims more than the best design has, or a root near 0 makes its damping ratio jump."""
-    goal, best, least = state.problem.objective, state.best, compute_threshold(state)
+    """Whether an end claims a better objective than the best design, or a root near 0 lets the damping ratio jump."""
+    goal, best, threshold = state.problem.objective, state.best, compute_threshold(state)
     if state.sample is None:
         return False
     if best is not None and goal is not None and "damping_ratio" in goal.names:
         sizes = sorted(root.size for root in best.checked.structure.roots)
         if sizes and sizes[0] < state.tuning.zero_root * sizes[-1]:
             return True
-    return any(end.objective < least for end in state.feasible)
+    return any(end.objective < threshold for end in state.feasible)
 
 
 def move_aside(state: SearchState, policy: Policy) -> SearchState:
-    """Replace the best end by a design a tiny step away that has the objective which one of the best ends claims."""
-    problem, lost = state.problem, state.tuning.lost
+    """Replace the best end by a design close to an end, if the design has the objective that this end claims."""
+    problem, tolerance = state.problem, state.tuning.lost
     for end in select_distinct_ends(state.ends)[: state.tuning.asides]:
-        whole = check_end(state, end)
-        for design in (whole.parameters, *_propose_near_designs(state, whole.parameters, end.objective)):
+        checked_end = check_end(state, end)
+        for design in (checked_end.parameters, *_propose_near_designs(state, checked_end.parameters, end.objective)):
             checked = state.recheck(design)
-            moved = replace(whole, parameters=problem.ordered(design), checked=checked)
-            if checked.violations or not claim_matches(problem, moved):
+            neighbour = replace(checked_end, parameters=problem.ordered(design), checked=checked)
+            if checked.violations or not claim_matches(problem, neighbour):
                 continue
-            exact = certified_numbers(problem, moved.parameters, checked, state.nlp.cases).value
-            confirmed = math.isclose(exact, problem.sign * end.objective, rel_tol=lost, abs_tol=lost)
-            if confirmed and (state.best is None or not is_better(problem, state.best, moved)):
-                return replace(state, best=moved)
+            exact_value = certified_numbers(problem, neighbour.parameters, checked, state.nlp.cases).value
+            confirmed = math.isclose(exact_value, problem.sign * end.objective, rel_tol=tolerance, abs_tol=tolerance)
+            if confirmed and (state.best is None or not is_better(problem, state.best, neighbour)):
+                return replace(state, best=neighbour)
     return state
 
 
 def _propose_near_designs(
     state: SearchState, design: Mapping[str, float], objective: float
 ) -> Iterator[dict[str, float]]:
-    """Designs close to one, towards others, that meet the limits and have nearly the given objective."""
+    """Yield designs near a design, in the direction of others, that meet the limits and have nearly this objective."""
     assert state.sample is not None
     box, tuning = state.sample.box, state.tuning
-    own = box.space.points(design)
-    random = stream(box.seed, "aside").random((tuning.towards, len(own)))
-    towards = np.concatenate([state.sample.refined.u[: tuning.rivals_seen], random])
-    seen = box.judge_points((own + np.array(tuning.hairs)[:, None, None] * (towards - own)).reshape(-1, len(own)))
-    close = (seen.violation == 0) & (np.abs(seen.objective - objective) <= tuning.edge * (1 + abs(objective)))
-    rows = np.flatnonzero(close)  # from far to near: far ones may be worse, and rounding decides between near ones
-    return box.designs(seen.take(rows[:: max(len(rows) // tuning.kept, 1)]))
+    point = box.space.points(design)
+    random = stream(box.seed, "aside").random((tuning.towards, len(point)))
+    targets = np.concatenate([state.sample.refined.u[: tuning.rivals_seen], random])
+    points = point + np.array(tuning.hairs)[:, None, None] * (targets - point)
+    batch = box.judge_points(points.reshape(-1, len(point)))
+    is_close = (batch.violation == 0) & (np.abs(batch.objective - objective) <= tuning.edge * (1 + abs(objective)))
+    # The rows go from far to near: a far design may be worse, and rounding decides between near ones.
+    rows = np.flatnonzero(is_close)
+    return box.designs(batch.take(rows[:: max(len(rows) // tuning.kept, 1)]))
 
 
 def keep_rival(state: SearchState, policy: Policy) -> SearchState:
-    """Keep a sampled design that is still better than all ends, as a fallback."""
+    """Keep a sampled design as a fallback if it is still better than all ends."""
     rivals = find_rivals(state)
     if not rivals or not state.sample:
         return state
     box = state.sample.box
-    finest = box.refine(rivals.take_first(1), state.tuning.finest).join(rivals)
-    for design in box.designs(finest.take_first(state.tuning.kept)):
+    fine_batch = box.refine(rivals.take_first(1), state.tuning.finest).join(rivals)
+    for design in box.designs(fine_batch.take_first(state.tuning.kept)):
         checked = state.recheck(design)
         if not checked.violations and state.problem.sign * checked.objective < compute_threshold(state):
             return replace(state, fallback=Fallback(design, KEPT))
@@ -196,9 +205,9 @@ def can_approach_infinity(state: SearchState) -> bool:
         return True
     if not sample.singular:
         return False
-    failed = bool(np.any(sample.refined.violation == 0)) and not all(end.feasible for end in state.ends)
+    starts_failed = bool(np.any(sample.refined.violation == 0)) and not all(end.feasible for end in state.ends)
     return (
-        failed
+        starts_failed
         or best is None
         or has_runaway_root(best.checked.structure.roots, state.tuning.far_root)
         or bool(find_singular_rivals(state))
@@ -206,7 +215,7 @@ def can_approach_infinity(state: SearchState) -> bool:
 
 
 def find_singular_rivals(state: SearchState) -> DesignBatch:
-    """Designs with a singular mass matrix that beat the best end, roots at infinity ignored."""
+    """Find designs with a singular mass matrix that are better than the best end if roots at infinity are ignored."""
     assert state.sample is not None
     if not state.sample.singular:
         return state.sample.refined.take_first(0)
@@ -217,64 +226,68 @@ def find_singular_rivals(state: SearchState) -> DesignBatch:
 
 
 def search_singular(state: SearchState, policy: Policy) -> SearchState:
-    """Search where a0 may reach 0, from either side: for an optimum that no end reached, or an infimum at a0 = 0."""
+    """Search on both sides of a0 = 0, which the program may reach here.
+
+    The search finds an optimum that no end reached, or an infimum at a0 = 0, where the fallback says that no design is
+    the best.
+    """
     assert state.sample is not None
     tuning, box, best = state.tuning, state.sample.box, state.best
     rivals = (find_rivals(state) or state.sample.refined).join(find_singular_rivals(state))
     rows = np.arange(len(rivals))
-    few = np.union1d(rows[: tuning.open], rows[-tuning.open :])
-    starts = [Start(design) for design in box.designs(rivals.take(few))]
+    chosen_rows = np.union1d(rows[: tuning.open], rows[-tuning.open :])
+    starts = [Start(design) for design in box.designs(rivals.take(chosen_rows))]
     starts += [Start(best.parameters)] if best else []
     starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.take_first(tuning.open))]
     at_zero = best is not None and abs(compute_relative_a0(state, best.parameters)) < tuning.singular
-    least = compute_threshold(state, -tuning.lost if at_zero else tuning.finer)
+    threshold = compute_threshold(state, -tuning.lost if at_zero else tuning.finer)
     for sign in (1, -1):
-        own_starts = [s for s in starts if sign * compute_relative_a0(state, s.design) > -tuning.singular]
+        side_starts = [s for s in starts if sign * compute_relative_a0(state, s.design) > -tuning.singular]
         nlp = formulate(state.part, state.nlp.cases, lead=sign)
-        own = try_starts(state.with_program(nlp), own_starts, disable_stopping(policy))
-        reached = min(own.feasible, key=lambda end: end.objective, default=None)
-        if reached is None or not reached.objective < least:
+        side_state = try_starts(state.with_program(nlp), side_starts, disable_stopping(policy))
+        best_end = min(side_state.feasible, key=lambda end: end.objective, default=None)
+        if best_end is None or not best_end.objective < threshold:
             continue
-        leads = np.array(nlp.rows) == "a0"
-        singular = bool(nlp.evaluate(reached.run.x)[1][leads].min() < tuning.singular)
+        is_a0_row = np.array(nlp.rows) == "a0"
+        singular = bool(nlp.evaluate(best_end.run.x)[1][is_a0_row].min() < tuning.singular)
         if singular:
-            lower = np.where(leads, tuning.inside, nlp.row_lower)
-            own = state.with_program(replace(nlp, row_lower=tuple(lower.tolist())))
-            own = try_starts(own, [Start(state.design_at(reached))], disable_stopping(policy))
-        own = policy.accept(own)
-        if own.best is None or own.best.checked.violations or has_merged_roots(own.best):
-            near = best and singular and has_runaway_root(best.checked.structure.roots, tuning.far_root)
-            if best and near and reached.objective < compute_threshold(state):
+            lower = np.where(is_a0_row, tuning.inside, nlp.row_lower)
+            side_state = state.with_program(replace(nlp, row_lower=tuple(lower.tolist())))
+            side_state = try_starts(side_state, [Start(state.design_at(best_end))], disable_stopping(policy))
+        side_state = policy.accept(side_state)
+        if side_state.best is None or side_state.best.checked.violations or has_merged_roots(side_state.best):
+            is_near_singular = best and singular and has_runaway_root(best.checked.structure.roots, tuning.far_root)
+            if best and is_near_singular and best_end.objective < compute_threshold(state):
                 advice = write_mass_advice(state.problem)
                 words = f"a better design may be close to a singular mass matrix (a0 = 0); {advice}"
                 state = replace(state, fallback=Fallback(best.parameters, words))
             continue
-        if not state.problem.sign * own.best.checked.objective < least:
+        if not state.problem.sign * side_state.best.checked.objective < threshold:
             continue
-        ends, least = (*state.ends, *own.ends), compute_threshold(own, tuning.finer)
-        state = replace(own, ends=ends, accepted=len(ends), fallback=None)
+        ends, threshold = (*state.ends, *side_state.ends), compute_threshold(side_state, tuning.finer)
+        state = replace(side_state, ends=ends, accepted=len(ends), fallback=None)
         if singular:
-            goal = f"towards a singular mass matrix (a0 = 0), to {state.problem.sign * reached.objective:.9g}"
+            goal = f"towards a singular mass matrix (a0 = 0), to {state.problem.sign * best_end.objective:.9g}"
             words = f"no best design: it improves {goal}; {write_mass_advice(state.problem)}"
-            state = replace(state, fallback=Fallback(own.best.parameters, words, without_best=True))
+            state = replace(state, fallback=Fallback(side_state.best.parameters, words, without_best=True))
     return state
 
 
 def compute_relative_a0(state: SearchState, design: Mapping[str, float]) -> float:
-    """a0 relative to the largest coefficient."""
+    """Return a0 relative to the largest coefficient."""
     a = [float(c) for c in state.problem.values(state.problem.ordered(design)).coefficients]
     return a[0] / (max(map(abs, a)) or 1.0)
 
 
 def has_merged_roots(trial: CheckedEnd) -> bool:
-    """Whether distant roots count as one, because rounding near a0 = 0 dominates the coefficients."""
+    """Whether distant roots count as one root, because rounding errors near a0 = 0 dominate the coefficients."""
     ideal, stored = trial.checked.structure.abscissa, trial.checked.realised
     return abs(ideal - stored) > trial.tuning.merged * abs(ideal)
 
 
 RESCUES = (
     Rescue("other chains", "", has_only_crossings, search_other_chains),
-    # If both are variables, their factors are singular where real roots meet.
+    # If abscissa and damping ratio are both variables, their factors are singular where real roots meet.
     Rescue("real roots", "hard 3", lambda s: {"abscissa", "damping_ratio"} <= {*s.nlp.variables}, search_real_roots),
     Rescue("positive roots", "hard 7, systems 1, variety 4", can_have_positive_roots, search_positive_roots),
     Rescue("appeals", "sixfold 14", lambda s: bool(find_rivals(s)), restart_from_rivals),

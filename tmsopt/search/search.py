@@ -1,4 +1,4 @@
-"""Search one part of the box: from its initial state to a design with a status, in the worst cases too."""
+"""Search one part of the box: from the initial state to a design with a status, checked also in its worst cases."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,6 @@ from tmsopt.problem import Case, Posed, Starts
 from tmsopt.problem.dependence import WORSE_DIRECTION
 from tmsopt.problem.quantities import RADIUS
 from tmsopt.program.formulate import formulate
-from tmsopt.records import Table
 from tmsopt.search.acceptance import accept_best, is_better
 from tmsopt.search.local_search import solve_from
 from tmsopt.search.outcome import (
@@ -34,7 +33,7 @@ POLICY = Policy(sample_part, propose_starts, solve_from, accept_best, is_enough,
 
 
 def search_part(state: SearchState, policy: Policy = POLICY) -> tuple[SearchState, Outcome | None]:
-    """Run a search; return its final state and its best design, or None if nothing feasible was found."""
+    """Run a search; return its final state and its best design, or None if it found no feasible design."""
     goal = state.problem.objective.names if state.problem.objective else ()
     if RADIUS in goal and state.problem.pattern is None:
         state = search(state, replace(RADIUS_POLICY, tuning=policy.tuning))
@@ -44,7 +43,7 @@ def search_part(state: SearchState, policy: Policy = POLICY) -> tuple[SearchStat
 
 
 def search_nested(state: SearchState) -> Outcome | None:
-    """The best design of a search inside another one.
+    """Return the best design of a search that runs inside another search.
 
     Raises:
         KeyboardInterrupt: if the user stops it, so that the outer search stops too.
@@ -56,7 +55,7 @@ def search_nested(state: SearchState) -> Outcome | None:
 
 
 def _assess_search(state: SearchState, policy: Policy) -> Outcome | None:
-    """The best design of a finished search, with its status."""
+    """Return the best design of a finished search, with its status."""
     problem, best, fallback = state.problem, state.best, state.fallback
     starts = count_starts(state.ends, best.end.objective if best else math.nan, state.tuning.same)
     if fallback:
@@ -68,12 +67,12 @@ def _assess_search(state: SearchState, policy: Policy) -> Outcome | None:
             without_best=fallback.without_best,
         )
         return demote_if_unbounded(state, outcome)
-    found = cover_cases(state, policy, starts) if problem.cases else assess_best(state, starts)
-    return demote_if_unbounded(state, demote_if_beaten(state, found)) if found else None
+    result = cover_cases(state, policy, starts) if problem.cases else assess_best(state, starts)
+    return demote_if_unbounded(state, demote_if_beaten(state, result)) if result else None
 
 
 def cover_cases(state: SearchState, policy: Policy, starts: Starts) -> Outcome | None:
-    """The best design once cases have been added until none between them is worse."""
+    """Add cases until no case between them is worse, and return the best design, with its status."""
     problem, tuning = state.problem, state.tuning
     exhaustive = disable_stopping(policy)
     if state.best and problem.asks_radius and not any(case.edge for case in state.nlp.cases):
@@ -88,13 +87,13 @@ def cover_cases(state: SearchState, policy: Policy, starts: Starts) -> Outcome |
         if sum(trial.checked.violations.values()) > math.sqrt(FEASIBLE) and not problem.asks_radius:
             break  # the current cases are not met
         worst = find_worst_cases(problem, trial.parameters)
-        more = [*_find_uncovered_cases(problem, trial, worst), *_find_nearer_boundary(trial, tuning.nearer)]
-        if not more:
+        new_cases = _find_uncovered_cases(problem, trial, worst)
+        if not new_cases:
             break
         best, worst = trial if is_better(problem, trial, best) else best, {}
         current = [best.parameters] if best is trial else [best.parameters, trial.parameters]
         leaders = _select_apart(problem, [*current, *_list_leaders(state)], tuning.alike_designs)
-        state = state.with_program(formulate(state.part, (*trial.end.nlp.cases, *more)))
+        state = state.with_program(formulate(state.part, (*trial.end.nlp.cases, *new_cases)))
         state = policy.accept(try_starts(state, (Start(d) for d in leaders), exhaustive))
         if _is_worse_than_leaders(state, leaders):
             state = policy.accept(try_starts(state, (Start(d, near=False) for d in leaders), exhaustive))
@@ -105,64 +104,48 @@ def cover_cases(state: SearchState, policy: Policy, starts: Starts) -> Outcome |
     if state.best is None:
         return None
     cases = state.best.end.nlp.cases
-    listed = merge_cases(problem, worst or find_worst_cases(problem, state.best.parameters))
-    return assess_best(state, starts, (*cases, *(c for c in listed if c not in cases)))
+    listed_cases = merge_cases(problem, worst or find_worst_cases(problem, state.best.parameters))
+    return assess_best(state, starts, (*cases, *(c for c in listed_cases if c not in cases)))
 
 
 def _is_worse_than_leaders(state: SearchState, leaders: Sequence[Mapping[str, float]]) -> bool:
-    """Whether the best design is worse, in the cases of its program, than a design that it started from."""
+    """Whether the best design is worse, in the cases of the program, than a design that was a start."""
     if state.best is None:
         return True
     if state.problem.objective is None:
         return False
-    sign, own = state.problem.sign, [state.recheck(design) for design in leaders]
-    known = min((sign * c.objective for c in own if not c.violations), default=math.inf)
-    reached = sign * state.best.checked.objective
-    return reached > known and not same_objective(reached, known, state.nlp.size, state.tuning.same)
+    sign, evaluations = state.problem.sign, [state.recheck(design) for design in leaders]
+    best_known = min((sign * c.objective for c in evaluations if not c.violations), default=math.inf)
+    value = sign * state.best.checked.objective
+    return value > best_known and not same_objective(value, best_known, state.nlp.size, state.tuning.same)
 
 
-def _find_uncovered_cases(problem: Posed, trial: CheckedEnd, found: Mapping[str, Worst]) -> list[Case]:
-    """Cases in which the design is worse than in all cases that it was made for."""
-    more, known = list[Case](), trial.checked
-    own = {**known.quantities, "abscissa": known.structure.abscissa}
-    for name, worst in found.items():
+def _find_uncovered_cases(problem: Posed, trial: CheckedEnd, worst_cases: Mapping[str, Worst]) -> list[Case]:
+    """Find cases in which a design is worse than in all cases for which it was made."""
+    cases, checked = list[Case](), trial.checked
+    values = {**checked.quantities, "abscissa": checked.structure.abscissa}
+    for name, worst in worst_cases.items():
         if name in WORSE_DIRECTION:
-            excess = WORSE_DIRECTION[name] * (worst.value - own[name])
+            excess = WORSE_DIRECTION[name] * (worst.value - values[name])
         elif name == "objective":
-            excess = abs(worst.value - known.objective)
+            excess = abs(worst.value - checked.objective)
         else:
-            beyond = problem.conditions[name.removeprefix("constraint ")].excess(worst.value)
-            excess = float(beyond) if beyond > 0 else 0.0  # nan counts as none
-        if not excess <= FEASIBLE * (1 + abs(worst.value)) and worst.case not in more:
-            more.append(worst.case)
-    return more
-
-
-def _find_nearer_boundary(trial: CheckedEnd, least: float) -> list[Case]:
-    """The direction in which stability is lost before the radius that the design claims."""
-    around, nlp = trial.checked.robustness, trial.end.nlp
-    if around is None or RADIUS not in nlp.variables:
-        return []
-    claimed = float(trial.point.x[nlp.variables.index(RADIUS)])
-    if around.radius >= claimed * (1 - least) or not around.limit.found:
-        return []
-    length = around.limit.distance or 1.0
-    step = {n: u / length for n, u in around.limit.direction.items()}
-    known = [c.direction for c in nlp.cases]
-    if any(all(abs(step[n] - k.get(n, 0.0)) < least for n in step) for k in known):  # stable again further out
-        step = {n: u * around.radius / claimed * (1 + least) for n, u in step.items()}
-    return [Case(direction=Table(step))]
+            amount = problem.conditions[name.removeprefix("constraint ")].excess(worst.value)
+            excess = float(amount) if amount > 0 else 0.0  # nan counts as none
+        if not excess <= FEASIBLE * (1 + abs(worst.value)) and worst.case not in cases:
+            cases.append(worst.case)
+    return cases
 
 
 def _select_apart(problem: Posed, designs: Sequence[Mapping[str, float]], share: float) -> list[Mapping[str, float]]:
-    """The designs without those that nearly equal an earlier one."""
-    kept: list[Mapping[str, float]] = []
+    """Return the designs without those that nearly equal an earlier one."""
+    selection: list[Mapping[str, float]] = []
     for design in designs:
-        if not any(is_close(problem, design, other, share) for other in kept):
-            kept.append(design)
-    return kept
+        if not any(is_close(problem, design, other, share) for other in selection):
+            selection.append(design)
+    return selection
 
 
 def _list_leaders(state: SearchState) -> list[dict[str, float]]:
-    """The designs of the best few distinct optima."""
+    """Return the designs of the best few distinct optima."""
     return [state.design_at(end) for end in select_distinct_ends(state.ends)[: state.tuning.followed]]

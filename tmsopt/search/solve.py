@@ -1,4 +1,4 @@
-"""The solution of a design problem, rechecked independently of the solver."""
+"""Solve a design problem, and recheck the solution independently of the solver."""
 
 import math
 import time
@@ -35,17 +35,17 @@ from tmsopt.search.stopping import count_starts
 UNSTABLE = "no stable design was found that meets the other limits"
 """Note for a problem with a limit on stability and no stable design found."""
 
-_ASKING = replace(DEFAULTS, stability=5.0, interruptible=True)
+_SOLVE_DEFAULTS = replace(DEFAULTS, stability=5.0, interruptible=True)
 _SAME_VALUE = (
     1e-6  # relative and absolute: difference of a value in doubles from the exact one, above which rounding decided
 )
 SearchedPart = tuple[SearchState, Outcome | None]
 """The final state of the search of one part of the box, and its best design."""
 
-_NEAR = 4  # starts near a design that branch and bound found, including this design
+_STARTS_NEAR = 4  # from a design that branch and bound found, and from designs near it
 
 
-@documents_options(SolveOptions, _ASKING)
+@documents_options(SolveOptions, _SOLVE_DEFAULTS)
 def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **options: Unpack[SolveOptions]) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
@@ -53,8 +53,8 @@ def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **opti
     stops at once.
 
     Args:
-        problem: or the path of its file.
-        throw: raise NotSolved unless the status is ``optimal``; if False, return the best point with its status.
+        problem: the problem, or the path of its file.
+        throw: whether to raise NotSolved unless the status is ``optimal``; if False, return the best point.
         policy: how to search each part of the box; see `tmsopt.Policy`. Two searches do not use it: the robustness
             radius first has its own, and the advice for infeasible problems uses `tmsopt.POLICY`.
         options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near``, ``alone``,
@@ -74,7 +74,7 @@ def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **opti
     """
     check_policy(policy)
     problem = as_solvable(problem)
-    solution = solve_any_status(problem, make_options(options, SolveOptions, _ASKING), policy=policy)
+    solution = solve_any_status(problem, make_options(options, SolveOptions, _SOLVE_DEFAULTS), policy=policy)
     if throw and solution.status != "optimal":
         raise NotSolved(solution)
     return solution
@@ -85,7 +85,7 @@ def solve_any_status(
     options: Options = DEFAULTS,
     extra_starts: Sequence[Mapping[str, float]] = (),
     without_sample: bool = False,
-    without: Collection[str] = (),
+    skipped_parts: Collection[str] = (),
     bound: bool = True,
     policy: Policy = POLICY,
 ) -> Solution:
@@ -93,8 +93,8 @@ def solve_any_status(
 
     Args:
         extra_starts: designs to start from that may be close to the optimum.
-        without_sample: start only from these and from the problem's start, and skip `add_cover`.
-        without: parts of the box to skip, such as ``normal rake``.
+        without_sample: whether to start only from these and from the problem's start, and to skip `add_cover`.
+        skipped_parts: parts of the box that are not searched, such as ``normal rake``.
         bound: whether to add a bound on the best possible objective.
     """
     if isinstance(design, Solution):
@@ -108,21 +108,25 @@ def solve_any_status(
         near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
         options = replace(options, near=near)
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
-    states = [s for s in begin_search(problem, options, tuple(extra_starts), policy.tuning) if s.side not in without]
-    found = _search_sides(states, policy)
-    best, interrupted = _pick_best(problem, found), any(state.interrupted for state, _ in found)
+    states = [
+        s for s in begin_search(problem, options, tuple(extra_starts), policy.tuning) if s.side not in skipped_parts
+    ]
+    searched_parts = _search_sides(states, policy)
+    best, interrupted = _pick_best(problem, searched_parts), any(state.interrupted for state, _ in searched_parts)
     try:
         if interrupted:
             raise KeyboardInterrupt
-        outcome = best or explain_infeasible(problem, [state for state, _ in found], policy)
+        outcome = best or explain_infeasible(problem, [state for state, _ in searched_parts], policy)
     except KeyboardInterrupt:
         if not options.interruptible:
             raise
-        interrupted, outcome = True, _find_best_so_far(problem, found, best)
-    judged = sum(len(state.sample.box.draws) for state, _ in found if state.sample)
+        interrupted, outcome = True, _find_best_so_far(problem, searched_parts, best)
+    judged = sum(len(state.sample.box.draws) for state, _ in searched_parts if state.sample)
     outcome = replace(outcome, starts=replace(outcome.starts, looked=judged))
-    notes = (*_describe_sides(problem, found, outcome), *sense_notes(problem))
-    sides = {state.side: o.checked.objective if o and o.status == "optimal" else math.nan for state, o in found}
+    notes = (*_describe_sides(problem, searched_parts, outcome), *sense_notes(problem))
+    sides = {
+        state.side: o.checked.objective if o and o.status == "optimal" else math.nan for state, o in searched_parts
+    }
     solution = _assemble(problem, outcome, notes, {n: value for n, value in sides.items() if n}, began, bound)
     solution = replace(solution, interrupted=interrupted)
     solution = solution if without_sample else add_cover(solution)
@@ -130,9 +134,7 @@ def solve_any_status(
         return solution
     try:
         solution = _add_stability(solution, options, began, policy)
-        advised, missed = add_required_speed(solution, options)
-        words = "this design was reached from a stable design that the search for the lowest speed found"
-        return _solve_near(advised, missed, words, options, policy) if missed else advised
+        return add_required_speed(solution, options)
     except KeyboardInterrupt:
         if not options.interruptible:
             raise
@@ -155,16 +157,16 @@ def _check_near(problem: Posed, near: Mapping[str, float]) -> None:
 
 
 def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[SearchedPart]:
-    """Search each part of the box, the one with the best sampled design first; return them in the given order."""
+    """Search each part of the box, that with the best sampled design first; return the parts in the given order."""
     if len(states) > 1:
         begin(states[0].options.progress, "looking at designs")
         states = [replace(state, sample=policy.sample(state)) for state in states]
-    found: dict[str, SearchedPart] = {}
+    searched_parts: dict[str, SearchedPart] = {}
     for state in sorted(states, key=lambda state: state.sample.rank if state.sample else (0.0, 0.0)):
-        found[state.side] = search_part(state, policy)
-        if found[state.side][0].interrupted:
+        searched_parts[state.side] = search_part(state, policy)
+        if searched_parts[state.side][0].interrupted:
             break
-    return [found[state.side] for state in states if state.side in found]
+    return [searched_parts[state.side] for state in states if state.side in searched_parts]
 
 
 def add_cover(solution: Solution) -> Solution:
@@ -181,12 +183,12 @@ def solve_if_needed(design: Given, progress: Listener | None) -> Solution:
 
 
 def evaluate_design(problem: Posed, design: Mapping[str, float], note: str) -> Solution:
-    """Recheck a design found elsewhere: ``not_converged``, or ``infeasible`` if it violates a limit."""
+    """Recheck a design from elsewhere: ``not_converged``, or ``infeasible`` if it violates a limit."""
     return _assemble(problem, assess_design(problem, design, note), (), {}, time.perf_counter())
 
 
-def _find_best_so_far(problem: Posed, found: Sequence[SearchedPart], outcome: Outcome | None) -> Outcome:
-    """The best design of an interrupted search: where starts ended, or in the sample.
+def _find_best_so_far(problem: Posed, searched_parts: Sequence[SearchedPart], outcome: Outcome | None) -> Outcome:
+    """Return the best design of an interrupted search, among the ends and the sampled designs.
 
     Raises:
         KeyboardInterrupt: if there is none.
@@ -198,16 +200,16 @@ def _find_best_so_far(problem: Posed, found: Sequence[SearchedPart], outcome: Ou
         return sum(outcome.checked.violations.values()), math.inf if math.isnan(value) else value
 
     designs: list[Mapping[str, float]] = [outcome.parameters] if outcome else []
-    for state, _ in found:
+    for state, _ in searched_parts:
         designs += [state.design_at(end) for end in sorted(state.ends, key=lambda end: end.rank)[:1]]
         designs += [state.sample.box.design(state.sample.refined)] if state.sample else []
     if not designs:
         raise KeyboardInterrupt
     best = min((assess_design(problem, design) for design in designs), key=rank)
-    ends = [end for state, _ in found for end in state.ends]
-    many = f"{len(ends)} start{'' if len(ends) == 1 else 's'} of the solver"
-    words = f"the user stopped the search after {many}; this is the best design so far"
-    formulation = found[0][0].nlp.formulation if ends else "none"
+    ends = [end for state, _ in searched_parts for end in state.ends]
+    count = f"{len(ends)} start{'' if len(ends) == 1 else 's'} of the solver"
+    words = f"the user stopped the search after {count}; this is the best design so far"
+    formulation = searched_parts[0][0].nlp.formulation if ends else "none"
     starts = count_starts(ends, problem.sign * best.checked.objective)
     return replace(best, starts=starts, formulation=formulation, notes=(words,))
 
@@ -237,30 +239,32 @@ def _solve_near(
 ) -> Solution:
     """Solve again near a design that the search has missed; keep the solution unless the new one is better."""
     problem = solution.problem.posed
-    few = replace(options, starts=min(options.starts, _NEAR), stability=0.0, alone=False, interruptible=False)
-    found = solve_any_status(problem, replace(few, near=design), policy=policy)
-    gain = problem.sign * (solution.value - found.value)
-    better = found.status == "optimal" and (solution.status != "optimal" or gain > 0)
-    return replace(found, notes=(*found.notes, words)) if better else solution
+    short_options = replace(
+        options, starts=min(options.starts, _STARTS_NEAR), stability=0.0, alone=False, interruptible=False
+    )
+    retry = solve_any_status(problem, replace(short_options, near=design), policy=policy)
+    gain = problem.sign * (solution.value - retry.value)
+    better = retry.status == "optimal" and (solution.status != "optimal" or gain > 0)
+    return replace(retry, notes=(*retry.notes, words)) if better else solution
 
 
-def _pick_best(problem: Posed, found: Sequence[SearchedPart]) -> Outcome | None:
-    """The best design of all parts of the box, with the starts of all parts."""
-    best = choose_outcome(problem, [outcome for _, outcome in found], found[0][0].tuning)
-    if best is None or len(found) == 1:
+def _pick_best(problem: Posed, searched_parts: Sequence[SearchedPart]) -> Outcome | None:
+    """Return the best design of all parts of the box; its starts are counted over all parts."""
+    best = choose_outcome(problem, [outcome for _, outcome in searched_parts], searched_parts[0][0].tuning)
+    if best is None or len(searched_parts) == 1:
         return best
-    starts = count_starts([end for state, _ in found for end in state.ends], math.nan)
+    starts = count_starts([end for state, _ in searched_parts for end in state.ends], math.nan)
     return replace(best, starts=replace(starts, at_best=best.starts.at_best))
 
 
-def _describe_sides(problem: Posed, found: Sequence[SearchedPart], best: Outcome) -> tuple[str, ...]:
-    """Note which part of the box has the best design, and what the other one has."""
-    won = next((state.side for state, o in found if o and o.parameters == best.parameters), None)
-    if len(found) == 1 or won is None or best.status != "optimal":
+def _describe_sides(problem: Posed, searched_parts: Sequence[SearchedPart], best: Outcome) -> tuple[str, ...]:
+    """Write a note on which part of the box has the best design, and what the other part has."""
+    best_side = next((state.side for state, o in searched_parts if o and o.parameters == best.parameters), None)
+    if len(searched_parts) == 1 or best_side is None or best.status != "optimal":
         return ()
-    sentences = [f"both signs of the tilt were searched: {won} is better"]
-    for state, outcome in found:
-        if state.side == won:
+    sentences = [f"both signs of the tilt were searched: {best_side} is better"]
+    for state, outcome in searched_parts:
+        if state.side == best_side:
             continue
         if outcome is None or outcome.checked.violations:
             stable = "stable and " if problem.asks_radius else ""
@@ -268,7 +272,7 @@ def _describe_sides(problem: Posed, found: Sequence[SearchedPart], best: Outcome
         elif problem.objective is None:
             sentences.append(f"{state.side} has a solution too")
         elif same_objective(outcome.checked.objective, best.checked.objective, objective_size(problem)):
-            return (f"both signs of the tilt were searched: {state.side} is as good as {won}",)
+            return (f"both signs of the tilt were searched: {state.side} is as good as {best_side}",)
         else:
             which = "the best design" if outcome.status == "optimal" else "the design found"
             unit = unit_at(problem, problem.goal, outcome.parameters)
@@ -286,16 +290,17 @@ def _assemble(
     began: float,
     bound: bool = True,
 ) -> Solution:
-    parameters, checked, lost = find_storable_design(problem, outcome.parameters, outcome.checked, outcome.cases)
+    stored = find_storable_design(problem, outcome.parameters, outcome.checked, outcome.cases)
+    parameters, checked, rounding_excess = stored
     outcome = replace(outcome, parameters=parameters, checked=checked)
     numbers = certified_numbers(problem, outcome.parameters, checked, outcome.cases)
     confirmed = math.isclose(numbers.value, checked.objective, rel_tol=_SAME_VALUE, abs_tol=_SAME_VALUE)
     if outcome.status == "optimal" and problem.free and problem.objective is not None and not confirmed:
         outcome = replace(outcome, status="not_converged", notes=(*outcome.notes, UNCLEAR))
-    optimal, listed = outcome.status == "optimal", bool(problem.scenarios or problem.tolerances)
+    optimal, has_cases = outcome.status == "optimal", bool(problem.scenarios or problem.tolerances)
     name, worst = user_structure_name(problem.model, checked.structure.name), checked.worst.applied(parameters)
-    whole = polynomial_structure(problem.model, name, numbers.roots).roots
-    meetings = every_meeting(problem, worst, whole, () if checked.crossing else checked.violations)
+    all_roots = polynomial_structure(problem.model, name, numbers.roots).roots
+    meetings = every_meeting(problem, worst, all_roots, () if checked.crossing else checked.violations)
     edges, certain = find_edges(problem, worst, checked.structure, optimal, numbers.abscissa, meetings)
     return Solution(
         problem=problem.problem,
@@ -308,7 +313,7 @@ def _assemble(
         structure=name,
         active=Table(outcome.active),
         violations=checked.amounts,
-        missed=Table(lost),
+        missed=Table(rounding_excess),
         bound=bound_without_search(problem, outcome.status, numbers.value) if bound else Bound(),
         starts=outcome.starts,
         seconds=time.perf_counter() - began,
@@ -319,19 +324,19 @@ def _assemble(
         branches=outcome.branches,
         notes=(
             *outcome.notes,
-            *missed_note(problem, lost),
+            *missed_note(problem, rounding_excess),
             *notes,
             *_describe_stability(problem, checked, edges, optimal),
         ),
-        worst=checked.worst if listed else None,
-        least_damped=checked.least_damped if listed else None,
-        fastest=checked.fastest if listed and problem.asks(ANGULAR_FREQUENCY) else None,
+        worst=checked.worst if has_cases else None,
+        least_damped=checked.least_damped if has_cases else None,
+        fastest=checked.fastest if has_cases and problem.asks(ANGULAR_FREQUENCY) else None,
         sides=Table(sides),
         relaxation=outcome.relaxation,
         meetings=meetings,
         edges=edges,
         edge_is_exact=certain,
-        multiple_as_rounded=bool(meetings) and not problem.free and not is_exactly_multiple(problem, worst, whole),
+        multiple_as_rounded=bool(meetings) and not problem.free and not is_exactly_multiple(problem, worst, all_roots),
         without_best=outcome.without_best,
         si=numbers.si,
     )
@@ -344,19 +349,21 @@ def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str
         )
     if "a0" in checked.violations:
         return (f"the mass matrix is singular (a0 = 0), so a root is at infinity; {write_mass_advice(problem)}",)
-    asked = [n for n, c in problem.conditions.items() if n in checked.violations and "abscissa" in c.names]
-    unstable = (UNSTABLE,) if asked and checked.structure.abscissa >= 0 else ()
-    beyond = beyond_axis(problem.model, problem.located, checked.structure.roots) if optimal else None
-    if beyond:
+    violated_limits = [n for n, c in problem.conditions.items() if n in checked.violations and "abscissa" in c.names]
+    unstable = (UNSTABLE,) if violated_limits and checked.structure.abscissa >= 0 else ()
+    real_part = beyond_axis(problem.model, problem.located, checked.structure.roots) if optimal else None
+    if real_part:
         another = "root has real part" if problem.model.carrier is None else "eigenfrequency has gain"
-        return (f"not the edge of stability: another {another} {unit_of(problem, 'abscissa').show(beyond, 2)}",)
+        return (f"not the edge of stability: another {another} {unit_of(problem, 'abscissa').show(real_part, 2)}",)
     if unstable or not optimal or checked.structure.abscissa < 0:
         return unstable
     largest = max((r.size for r in checked.structure.roots), default=0.0)
-    found = stability((checked.structure.abscissa, checked.realised), edges, largest=largest)
+    verdict = stability((checked.structure.abscissa, checked.realised), edges, largest=largest)
     if problem.free and minimizes_abscissa(problem):
         at_edge = (
             "no design that decays was found in the box; at abscissa 0, multiple roots decide whether motions grow"
         )
-        return (at_edge if found.on_edge else "no stable design was found in the box; this is the least unstable one",)
-    return () if found.on_edge else ("the design is not stable: abscissa >= 0",)
+        return (
+            at_edge if verdict.on_edge else "no stable design was found in the box; this is the least unstable one",
+        )
+    return () if verdict.on_edge else ("the design is not stable: abscissa >= 0",)

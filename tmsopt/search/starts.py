@@ -1,4 +1,4 @@
-"""Designs to start from: the caller's, then the sample's refined and bold ones in turn, then a sequence."""
+"""Designs to start from: the caller's, then refined and bold designs of the sample in turn, then quasi-random ones."""
 
 from collections.abc import Iterator
 from itertools import zip_longest
@@ -16,7 +16,7 @@ def sample_part(state: SearchState) -> Sample | None:
 
 
 def propose_starts(state: SearchState) -> Iterator[Start]:
-    """Starts in order: the caller's, the best refined design, the boldest, the next refined one, and so on."""
+    """Yield starts: the caller's, the best refined design, the boldest, the second refined one, and so on."""
     part = state.part
     if state.options.near:
         yield Start(state.options.near)
@@ -29,7 +29,7 @@ def propose_starts(state: SearchState) -> Iterator[Start]:
 
 
 def propose_sample_starts(sample: Sample) -> Iterator[Start]:
-    """Refined and bold designs of a sample in turn."""
+    """Yield refined and bold designs of a sample in turn."""
     count = len(sample.refined)
     for pair in zip_longest(range(count), range(count, len(sample.leaders))):
         for row in pair:

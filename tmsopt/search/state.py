@@ -1,4 +1,4 @@
-"""The state of a search: a frozen record, which every stage returns anew."""
+"""The state of a search: a frozen record; each stage returns a new one."""
 
 import math
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ class Start:
     Attributes:
         design: free parameters; a missing one takes its value in the problem's start, or the middle of its range.
         near: whether the design may be close to an optimum.
-        row: its row in the sample; -1 for another design.
+        row: row of the design in the sample; -1 if it is not from the sample.
 
     Example:
         >>> tmsopt.Start({"Fr": 2.0, "chi_B": 1.4}).near
@@ -45,11 +45,11 @@ class LocalEnd:
     Attributes:
         start: the start.
         nlp: the program with the limits that were active.
-        objective: of the NLP, less is better whatever the problem asks for, plus what its rows may gain by rounding;
-            inf unless finite.
+        objective: of the NLP, plus what its rows may gain by rounding; less is better, whether the problem minimises
+            or maximises; inf where it has no value.
         feasible: whether the rows hold at IPOPT's end, the factors cover all roots, and located roots have Jordan
             chains; the recheck may still find a violated limit.
-        crossing: whether only these chains are missing.
+        crossing: whether the end is infeasible only because these chains are missing.
         led: rows of the sample's designs from which the objective falls along a straight line to this end.
 
     Example:
@@ -75,7 +75,7 @@ class LocalEnd:
 
     @property
     def weight(self) -> int:
-        """How many starts the end counts for: a sampled design that leads straight to it counts as a start."""
+        """For how many starts the end counts: a sampled design that leads straight to the end counts as a start."""
         return 1 + len(self.led)
 
     @property
@@ -85,7 +85,7 @@ class LocalEnd:
 
 
 def make_failed_end(start: Start, nlp: NLP) -> LocalEnd:
-    """An infeasible end of a start that led nowhere."""
+    """Make an infeasible end for a start from which no solve was possible."""
     return LocalEnd(start, nlp, Run(np.full(len(nlp.variables), np.nan), np.empty(0), np.empty(0), ""), math.inf, False)
 
 
@@ -121,11 +121,11 @@ class CheckedEnd:
 
 @dataclass(frozen=True)
 class Fallback:
-    """A design returned if no optimum is known: one better than all ends, or one near an infimum.
+    """A design to return if no optimum is known: it is better than all ends, or near an infimum.
 
     Attributes:
-        design: its free parameters.
-        words: why it is no optimum.
+        design: the free parameters.
+        words: why the design is no optimum.
         without_best: whether no optimum exists.
     """
 
@@ -146,9 +146,9 @@ class SearchState:
         extra: designs that may be close to the optimum.
         sample: of the part; None if arrays cannot judge the problem, or the policy takes no sample.
         ends: ends of the starts, in order.
-        accepted: how many of these were considered for `best`.
+        accepted: how many of the ends were considered for `best`.
         best: the best end that passed the recheck, or the one that fails it least.
-        fallback: a design to return instead of `best`; no optimum either.
+        fallback: a design to return instead of `best`, though it is no optimum either.
         interrupted: whether the user stopped the search.
 
     Example:
@@ -185,19 +185,19 @@ class SearchState:
 
     @property
     def left(self) -> list[int]:
-        """Rows of the sample's designs that were not started from and lead straight to no end."""
-        done = {end.start.row for end in self.ends}.union(*(end.led for end in self.ends))
-        return [row for row in range(len(self.sample.leaders) if self.sample else 0) if row not in done]
+        """Rows of sampled designs that were no start and do not lead straight to an end."""
+        used_rows = {end.start.row for end in self.ends}.union(*(end.led for end in self.ends))
+        return [row for row in range(len(self.sample.leaders) if self.sample else 0) if row not in used_rows]
 
     @property
     def out_of_reach(self) -> bool:
-        """Whether all sampled designs are far from meeting the limits, even without the pattern."""
+        """Whether all sampled designs are far from meeting the limits, even if the pattern is left out."""
         sample = self.limits_sample
         return sample is not None and sample.out_of_reach
 
     @property
     def limits_sample(self) -> Sample | None:
-        """The sample; for a pattern, a sample for the limits alone."""
+        """The sample; for a problem with a pattern, a sample for its limits without the pattern."""
         if self.sample or not (self.part.pattern and self.part.conditions) or self.part.asks_radius:
             return self.sample
         return sample_limits(self.part, self.options.seed, self.tuning)
@@ -206,8 +206,8 @@ class SearchState:
     def so_far(self) -> str:
         """The best objective so far, in words."""
         best = min((end.objective for end in self.feasible), default=math.inf)
-        known = self.problem.objective is not None and math.isfinite(best)
-        return ", ".join(filter(None, (f"best {self.problem.sign * best:.6g}" if known else "", self.side)))
+        is_known = self.problem.objective is not None and math.isfinite(best)
+        return ", ".join(filter(None, (f"best {self.problem.sign * best:.6g}" if is_known else "", self.side)))
 
     @property
     def designs(self) -> list[dict[str, float]]:
@@ -219,7 +219,7 @@ class SearchState:
         return design_of(self.part, end.run.x.tolist())
 
     def coefficients_at(self, end: LocalEnd) -> Array:
-        """Coefficients in every case at an end, shape (cases, n + 1)."""
+        """Return the coefficients at an end in every case, shape (cases, n + 1)."""
         nominal = self.part.ordered(self.design_at(end))
         varied = [case.applied(nominal) for case in end.nlp.cases if not case.direction] or [nominal]
         return np.array([[float(c) for c in self.part.values(p).coefficients] for p in varied])
@@ -239,18 +239,19 @@ def begin_search(
     extra: tuple[Mapping[str, float], ...] = (),
     tuning: Tuning = TUNING,
 ) -> list[SearchState]:
-    """The initial states of a problem, one for each part of its box; only parts that contain `options.near`.
+    """Make the initial states of a problem, one for each part of its box that contains `options.near`.
 
-    The box is split at 0 of the first parameter with two named sides; positive values come first.
+    The box is split at 0 of the first parameter whose signs have names (such as ``normal rake``); positive values come
+    first.
     """
     parts = {"": problem}
     for name, (lower, upper) in problem.free.items():
         sides = problem.parameter_set[name].sides
         if sides is not None and lower < -tuning.thin and upper > tuning.thin:
             parts = {}
-            for side, least, most in ((sides[1], 0.0, upper), (sides[0], lower, 0.0)):
-                start = problem.start if least <= problem.start.get(name, least) <= most else {}
-                parts[side] = problem.derive(free={**problem.free, name: (least, most)}, start=start)
+            for side, low, high in ((sides[1], 0.0, upper), (sides[0], lower, 0.0)):
+                start = problem.start if low <= problem.start.get(name, low) <= high else {}
+                parts[side] = problem.derive(free={**problem.free, name: (low, high)}, start=start)
             break
     return [
         SearchState(problem, part, formulate(part, problem.cases), options, tuning, side, extra)
@@ -264,22 +265,22 @@ def is_inside(problem: Posed, design: Mapping[str, float]) -> bool:
     return all(lower <= design.get(n, lower) <= upper for n, (lower, upper) in problem.free.items())
 
 
-def is_close(problem: Posed, one: Mapping[str, float], other: Mapping[str, float], share: float) -> bool:
+def is_close(problem: Posed, design: Mapping[str, float], other: Mapping[str, float], share: float) -> bool:
     """Whether no free parameter differs by more than a share of its range."""
-    return all(abs(one[n] - other[n]) <= share * (upper - lower) for n, (lower, upper) in problem.free.items())
+    return all(abs(design[n] - other[n]) <= share * (upper - lower) for n, (lower, upper) in problem.free.items())
 
 
 def clip_to_box(problem: Posed, design: Mapping[str, float]) -> dict[str, float]:
-    """The free parameters of a design, moved into their ranges."""
+    """Return the free parameters of a design, moved into their ranges."""
     return {n: min(max(design[n], low), high) for n, (low, high) in problem.free.items()}
 
 
-def same_objective(a: float, b: float, size: float = 1.0, same: float = TUNING.same) -> bool:
+def same_objective(a: float, b: float, size: float = 1.0, tolerance: float = TUNING.same) -> bool:
     """Whether two objectives count as the same optimum; `size` is the least scale of the comparison."""
-    return abs(a - b) <= same * (size + abs(b))
+    return abs(a - b) <= tolerance * (size + abs(b))
 
 
 @lru_cache(maxsize=8)
 def sample_limits(problem: Posed, seed: int, tuning: Tuning) -> Sample:
-    """The sample of a problem for its limits alone, without its pattern."""
+    """Sample a problem without its pattern, for its limits alone."""
     return sample_box(problem.derive(locate=None), seed, tuning)

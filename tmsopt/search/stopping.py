@@ -1,4 +1,4 @@
-"""When a search ends: at a proven bound, when it is hopeless, or by the rule of `Starts`."""
+"""Decide when a search ends: at a proven bound, when it is hopeless, or by the rule of `Starts`."""
 
 import math
 from collections.abc import Sequence
@@ -21,18 +21,19 @@ def is_enough(state: SearchState) -> bool:
         return is_hopeless(state)
     best, count = min(end.objective for end in feasible), len(state.ends)
     starts = count_starts(state.ends, best, tuning.same)
-    if state.problem.objective is None:  # any solution will do, of a square or an over-determined pattern
+    # Without an objective, any solution will do; where solutions form a continuum, several starts must agree.
+    if state.problem.objective is None:
         freedom = degrees_of_freedom(state.part).count
-        met = freedom == 0 or (freedom < 0 and best <= tuning.met_conditions)
-        return starts.at_best >= (1 if met else tuning.agree)
+        is_met = freedom == 0 or (freedom < 0 and best <= tuning.met_conditions)
+        return starts.at_best >= (1 if is_met else tuning.agree)
     if state.ends[-1].objective == best and is_proven(state, state.ends[-1]):
         return True
     if sample is None:
         return count >= tuning.fewest_blind and starts.at_best >= tuning.agree and starts.suffice()
-    alone = sum(bool(sample.refined.violation[row] == 0) for row in state.left if row < len(sample.refined))
-    enough = count >= tuning.fewest_narrow or not sample.box.narrow
-    # A sampled design that leads to no end may lie in its own basin.
-    return (enough and starts.suffice(alone)) or count - len(feasible) >= 2 * tuning.hopeless
+    unled_count = sum(bool(sample.refined.violation[row] == 0) for row in state.left if row < len(sample.refined))
+    has_minimum = count >= tuning.fewest_narrow or not sample.box.narrow
+    # A sampled design that leads straight to no end may lie in a basin of its own.
+    return (has_minimum and starts.suffice(unled_count)) or count - len(feasible) >= 2 * tuning.hopeless
 
 
 def is_hopeless(state: SearchState) -> bool:
@@ -49,12 +50,12 @@ def is_proven(state: SearchState, end: LocalEnd) -> bool:
     if not (end.feasible and minimizes_abscissa(problem)):
         return False
     a = state.coefficients_at(end)[0]
-    own = -(abs(a[-1] / a[0]) ** (1 / problem.model.degree)) if a[0] else -math.inf
-    near = is_gap_closed(end.objective - own, own, end.nlp.size)
-    return near and instant_bound(problem, end.objective).proven
+    bound = -(abs(a[-1] / a[0]) ** (1 / problem.model.degree)) if a[0] else -math.inf
+    is_near = is_gap_closed(end.objective - bound, bound, end.nlp.size)
+    return is_near and instant_bound(problem, end.objective).proven
 
 
-def count_starts(ends: Sequence[LocalEnd], best: float, same: float = TUNING.same) -> Starts:
+def count_starts(ends: Sequence[LocalEnd], best: float, tolerance: float = TUNING.same) -> Starts:
     """Count starts by how they ended; a sampled design that leads straight to an end counts as a start."""
     feasible = [end for end in ends if end.feasible]
     objectives = sorted(end.objective for end in feasible)
@@ -62,16 +63,16 @@ def count_starts(ends: Sequence[LocalEnd], best: float, same: float = TUNING.sam
     return Starts(
         tried=sum(end.weight for end in ends),
         converged=sum(end.weight for end in feasible),
-        at_best=sum(end.weight for end in feasible if same_objective(end.objective, best, end.nlp.size, same)),
-        optima=bool(objectives) + sum(not same_objective(a, b, size, same) for a, b in pairwise(objectives)),
+        at_best=sum(end.weight for end in feasible if same_objective(end.objective, best, end.nlp.size, tolerance)),
+        optima=bool(objectives) + sum(not same_objective(a, b, size, tolerance) for a, b in pairwise(objectives)),
         runs=len(ends),
     )
 
 
-def select_distinct_ends(ends: Sequence[LocalEnd], same: float = TUNING.same) -> list[LocalEnd]:
-    """The best end of each optimum, the best first."""
-    kept: list[LocalEnd] = []
+def select_distinct_ends(ends: Sequence[LocalEnd], tolerance: float = TUNING.same) -> list[LocalEnd]:
+    """Return the best end of each optimum, the best first."""
+    selection: list[LocalEnd] = []
     for end in sorted((e for e in ends if e.feasible), key=lambda e: e.objective):
-        if not any(same_objective(end.objective, other.objective, end.nlp.size, same) for other in kept):
-            kept.append(end)
-    return kept
+        if not any(same_objective(end.objective, other.objective, end.nlp.size, tolerance) for other in selection):
+            selection.append(end)
+    return selection

@@ -148,7 +148,6 @@ class Tuning:
     far_rounds: int = number(40, "times", "the same for the robustness radius", "variety")
     followed: int = number(3, "optima", "kept when cases are added: the best one may be worse in a new case", "variety")
     alike_designs: float = number(1e-6, "of the box", "distance of designs that count as one", "variety")
-    nearer: float = number(1e-7, "of the radius", "by which a boundary must be nearer to count", "variety")
     climbs: int = number(6, "climbs", "for the radius at most", "variety")
     fewest_climbs: int = number(3, "climbs", "at least", "variety")
     climb_rounds: int = number(10, "times", "that boundary points are added to a climb", "variety")

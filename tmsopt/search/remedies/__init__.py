@@ -1,4 +1,5 @@
 """Remedies for infeasible problems: limits in conflict, changes that help, required speeds.
 
-In: the problem, and a function that solves it again. Out: a `Relaxation` or a `Need`. Open `infeasible` first.
+The input is a problem that has no feasible end; the result is a `Relaxation` or a `RequiredValue`. Open `infeasible`
+first.
 """

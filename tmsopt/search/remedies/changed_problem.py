@@ -1,4 +1,4 @@
-"""A problem with changed limits, solved again within the time that advice may take."""
+"""Solve a problem with changed limits again, within the time that advice may take."""
 
 import time
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from tmsopt.search.search import POLICY, search_nested
 from tmsopt.search.state import SearchState, begin_search
 from tmsopt.search.stopping import count_starts
 
-_FEW_STARTS = 6  # of a problem with changed limits
+_FEW_STARTS = 6  # tried first for a problem with changed limits
 _LEAST_DECAY = 1e-6  # of the roots' mean size: a design that decays this fast counts as stable
 _SECONDS = 2.5  # least allowance, of process time: enough to solve a problem with seven free parameters again
 _SHARE = 0.3  # allowance as a share of the time spent before
@@ -42,7 +42,7 @@ def limit_time(options: Options, spent: float = 0.0) -> Options:
 def solve_again(
     problem: Posed, options: Options, original: Posed, thorough: bool = False
 ) -> Mapping[str, float] | None:
-    """The optimum of a changed problem; {} if it is not stable though `original` needs that; None without an optimum.
+    """Return the optimum of a changed problem; {} if it is unstable but `original` needs stability; None without one.
 
     A few starts suffice if they end at a stable design. They also suffice if all end at one least abscissa that is not
     stable, unless `thorough`. Otherwise the whole search runs.
@@ -50,8 +50,8 @@ def solve_again(
     limits = {**problem.constraints, **stability_limit(original, _LEAST_DECAY)}
     stable = problem.derive(constraints=limits, minimize=None, maximize=None)
     states = begin_search(problem, options)
-    few = [None if problem.cases else _search_few_starts(state, stable, thorough) for state in states]
-    outcomes = [outcome or search_nested(state) for state, outcome in zip(states, few, strict=True)]
+    quick_outcomes = [None if problem.cases else _search_few_starts(state, stable, thorough) for state in states]
+    outcomes = [outcome or search_nested(state) for state, outcome in zip(states, quick_outcomes, strict=True)]
     best = choose_outcome(problem, outcomes, states[0].tuning)
     if best is None or best.status != "optimal":
         return None
@@ -59,7 +59,7 @@ def solve_again(
 
 
 def _search_few_starts(state: SearchState, stable: Posed, thorough: bool) -> Outcome | None:
-    """The outcome of a few starts if it settles the question: a stable design, or one least abscissa for all starts."""
+    """Return the outcome of a few starts if it decides: a stable design, or the same least abscissa from all starts."""
     state = replace(state, sample=POLICY.sample(state))
     state = run_nested(state, POLICY.starts(state), POLICY, _FEW_STARTS)
     outcome = assess_best(state, Starts())
@@ -69,9 +69,9 @@ def _search_few_starts(state: SearchState, stable: Posed, thorough: bool) -> Out
         or has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway)
     ):
         return None
-    agreed = all(end.feasible for end in state.ends) and count_starts(state.ends, 0.0).optima == 1
-    settled = agreed and not thorough and minimizes_abscissa(state.part)
-    return outcome if settled or _is_met(stable, outcome) else None
+    is_agreed = all(end.feasible for end in state.ends) and count_starts(state.ends, 0.0).optima == 1
+    is_settled = is_agreed and not thorough and minimizes_abscissa(state.part)
+    return outcome if is_settled or _is_met(stable, outcome) else None
 
 
 def _is_met(problem: Posed, outcome: Outcome) -> bool:

@@ -22,17 +22,17 @@ from tmsopt.search.sample import Box, Sample, draw_box
 from tmsopt.search.search import POLICY
 from tmsopt.search.state import CheckedEnd, SearchState, Start, begin_search, clip_to_box, same_objective
 
-_ROUNDS = 12  # of adding cases, at most
-_MOST_STARTS = 8  # of a relaxation
-_LEADS = 2  # starts for one limit alone
-_AGREE = 3  # starts at the best value that end the search
-_TIE = 1e-3  # relative difference of the scales of equal limits: moving one is easier to read than two halves
-_WIDER = 3.0  # widths of the box by which its bounds may move
-_INSET = 1e-3  # share of the width kept from an excluded physical end
-_ACTIVE = 1e-5  # multiplier, per scale or width of the box, above which a limit is in the conflict
-_NOTHING = 1e-12  # sum of amounts below which the problem is feasible
-_FINEST = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # of the box: steps that refine the best sampled design
-_ROUND_UP = 1e-12  # of an amount, so that the design is inside the relaxed limits
+_MAX_ROUNDS = 12  # times that cases are added
+_MAX_STARTS = 8  # of a relaxation
+_STARTS_ALONE = 2  # sampled designs from which the relaxation of one limit alone starts
+_AGREEING_STARTS = 3  # starts that must end at the best value before the search may end
+_TIE = 1e-3  # relative difference of the scales of equal limits, so that one of them moves and not each by half
+_MAX_WIDENING = 3.0  # widths of a range by which its ends may move
+_INSET = 1e-3  # of the width: distance kept from a physical end that is excluded
+_MIN_MULTIPLIER = 1e-5  # of a limit in the conflict, per scale of the limit or width of the range
+_ZERO_SUM = 1e-12  # sum of amounts below which the problem is feasible
+_FINE_STEPS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # of the box; they refine the best sampled design
+_ROUND_UP = 1e-12  # of an amount, added so that the design is inside the relaxed limits
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Limit:
 
     Attributes:
         scale: the amount that counts as 1 in sums.
-        parameter, end: for an end of a range, its parameter and value.
+        parameter, end: parameter and value of an end of a range; empty and 0 for a constraint.
         upper: whether this is the upper end.
     """
 
@@ -57,8 +57,8 @@ class ElasticProblem:
     """A problem of which some limits may move: the sum of the amounts, each in units of its scale, is minimised.
 
     Attributes:
-        problem: in the box that is searched.
-        limits: those that may move; all others stay.
+        problem: the problem in the box that is searched.
+        limits: limits that may move; all others stay.
         sample: of the box, to start from.
     """
 
@@ -67,126 +67,130 @@ class ElasticProblem:
     options: Options
     sample: Sample | None = None
 
-    def find_least(
+    def find_least_relaxation(
         self, designs: Sequence[Mapping[str, float]] = ()
     ) -> tuple[Relaxation, CheckedEnd | None] | tuple[None, None]:
-        """The least relaxation, with its end, or without one for a known design; (None, None) if there is none."""
+        """Return the least relaxation, and its end if it is not a known design; (None, None) if there is none."""
         states = begin_search(self.problem, self.options)
         sides = [replace(self, problem=state.part, sample=POLICY.sample(state)) for state in states]
         ends = [end for side in sides if (end := side._find_least_in_cases())]
         trial = min(ends, key=lambda end: end.point.objective, default=None)
-        known = [] if self.problem.cases else [found for side in sides if (found := side._find_known(designs))]
-        least, relaxation = min(known, key=lambda found: found[0], default=(np.inf, None))
+        candidates = (
+            []
+            if self.problem.cases
+            else [candidate for side in sides if (candidate := side._relax_known_designs(designs))]
+        )
+        least_sum, relaxation = min(candidates, key=lambda candidate: candidate[0], default=(np.inf, None))
         amounts = self._compute_amounts(trial.parameters, trial.end.nlp.cases) if trial else {}
-        if relaxation and (trial is None or least < self.sum_amounts(amounts) * (1 - _TIE)):
+        if relaxation and (trial is None or least_sum < self.sum_amounts(amounts) * (1 - _TIE)):
             return relaxation, None
         return (Relaxation(Table(trial.parameters), Table(amounts)), trial) if trial else (None, None)
 
     def find_amounts(
         self, designs: Sequence[Mapping[str, float]], cases: Sequence[Case] | None = None
     ) -> dict[str, float]:
-        """Amounts of the least relaxation that these designs lead to; {} if they lead to none."""
+        """Return the amounts of the least relaxation to which these designs lead; {} if they lead to none."""
         nlp = self._build_program(self.problem.cases if cases is None else cases)
         trial = self._solve(nlp, designs)
         return self._compute_amounts(trial.parameters, nlp.cases) if trial else {}
 
     def sum_amounts(self, amounts: Mapping[str, float]) -> float:
-        """Sum of the amounts, each in units of its limit."""
+        """Sum the amounts, each in units of its limit's scale."""
         return sum(abs(amounts.get(limit.name, 0.0)) / limit.scale for limit in self.limits)
 
-    def list_holding(self, trial: CheckedEnd) -> list[str]:
-        """Limits with a multiplier: without one of them, less would suffice."""
+    def list_active_limits(self, trial: CheckedEnd) -> list[str]:
+        """List the limits with a nonzero multiplier: without any of these, smaller amounts would suffice."""
         scales, nlp = {limit.name: limit.scale for limit in self.limits}, trial.end.nlp
         rows = zip(nlp.rows, trial.point.row_multipliers.tolist(), strict=True)
-        names = [row for row, multiplier in rows if row in scales and abs(multiplier) * scales[row] > _ACTIVE]
+        names = [row for row, multiplier in rows if row in scales and abs(multiplier) * scales[row] > _MIN_MULTIPLIER]
         bounds = zip(nlp.variables, trial.point.bound_multipliers.tolist(), nlp.lower, nlp.upper, strict=True)
         for variable, multiplier, lower, upper in bounds:
             parameter = variable.removeprefix("tan(").removesuffix(")")
-            if parameter in trial.parameters and abs(multiplier) * (upper - lower) > _ACTIVE:
+            if parameter in trial.parameters and abs(multiplier) * (upper - lower) > _MIN_MULTIPLIER:
                 names.append(f"{parameter}.{'max' if multiplier > 0 else 'min'}")
         return names
 
     def _find_least_in_cases(self) -> CheckedEnd | None:
-        """The least relaxation of one part of the box, with cases added until none between them needs more."""
+        """Find the least relaxation of one part of the box; add cases until no case needs larger amounts."""
         cases = self.problem.cases
         trial = self._solve(self._build_program(cases))
         movable = [limit for limit in self.limits if not limit.parameter]
-        if trial and self.options.starts >= _MOST_STARTS and trial.point.objective > _NOTHING and len(movable) > 1:
+        if trial and self.options.starts >= _MAX_STARTS and trial.point.objective > _ZERO_SUM and len(movable) > 1:
             box = draw_box(self.problem.derive(locate=None), self.options.seed)
-            leads = {tuple(d.values()): d for limit in movable for d in _propose_leads(box, limit.name)}
-            again = self._solve(trial.end.nlp, list(leads.values()))
-            if again and again.point.objective < trial.point.objective * (1 - _TIE):
-                trial = again
-        for _ in range(_ROUNDS if cases else 0):
-            if trial is None or not (more := self._find_worse_cases(trial)):
+            lead_designs = {tuple(d.values()): d for limit in movable for d in _propose_designs(box, limit.name)}
+            second_trial = self._solve(trial.end.nlp, list(lead_designs.values()))
+            if second_trial and second_trial.point.objective < trial.point.objective * (1 - _TIE):
+                trial = second_trial
+        for _ in range(_MAX_ROUNDS if cases else 0):
+            if trial is None or not (new_cases := self._find_worse_cases(trial)):
                 break
-            nlp = self._build_program((*trial.end.nlp.cases, *more))
+            nlp = self._build_program((*trial.end.nlp.cases, *new_cases))
             trial = self._solve(nlp, [trial.parameters]) or self._solve(nlp)
         return trial
 
     def _solve(self, nlp: NLP, designs: Sequence[Mapping[str, float]] | None = None) -> CheckedEnd | None:
-        """The least relaxation from these designs, or from a few starts; None if a fixed limit is violated."""
+        """Find the least relaxation from these designs, or from a few starts; None if it violates a fixed limit."""
         state = SearchState(self._drop_limits(), self.problem, nlp, self.options)
         if designs is None:
             state = replace(state, sample=self.sample)
-            state = run_nested(state, POLICY.starts(state), _RELAXING, min(_MOST_STARTS, self.options.starts))
+            state = run_nested(state, POLICY.starts(state), _RELAXATION_POLICY, min(_MAX_STARTS, self.options.starts))
         else:
-            state = run_nested(state, map(Start, designs), disable_stopping(_RELAXING))
+            state = run_nested(state, map(Start, designs), disable_stopping(_RELAXATION_POLICY))
         return state.best if state.best is not None and not state.best.checked.violations else None
 
-    def _find_known(self, designs: Sequence[Mapping[str, float]]) -> tuple[float, Relaxation] | None:
-        """The least relaxation, and its sum, for known designs and the best sampled design."""
-        known, unlimited, sample = list(designs), self._drop_limits(), self.sample
+    def _relax_known_designs(self, designs: Sequence[Mapping[str, float]]) -> tuple[float, Relaxation] | None:
+        """Return the least sum of amounts among known designs and the best sampled design, with its relaxation."""
+        candidates, unlimited, sample = list(designs), self._drop_limits(), self.sample
         if sample:
-            known += sample.box.designs(sample.box.refine(sample.refined.take_first(1), _FINEST))
-        needs = [(p, self._compute_amounts(p, ())) for p in map(self.problem.ordered, known)]
+            candidates += sample.box.designs(sample.box.refine(sample.refined.take_first(1), _FINE_STEPS))
+        needs = [(p, self._compute_amounts(p, ())) for p in map(self.problem.ordered, candidates)]
         for parameters, amounts in sorted(needs, key=lambda need: self.sum_amounts(need[1])):
             if not recheck(unlimited, parameters).violations:
                 return self.sum_amounts(amounts), Relaxation(Table(parameters), Table(amounts))
         return None
 
     def _drop_limits(self) -> Posed:
-        """The problem without an objective and the constraints that may move."""
-        moved = {limit.name for limit in self.limits}
-        kept = {n: c for n, c in self.problem.constraints.items() if n not in moved}
-        return self.problem.derive(constraints=kept, minimize=None, maximize=None)
+        """Return the problem without its objective and without the constraints that may move."""
+        movable = {limit.name for limit in self.limits}
+        constraints = {n: c for n, c in self.problem.constraints.items() if n not in movable}
+        return self.problem.derive(constraints=constraints, minimize=None, maximize=None)
 
     def _find_worse_cases(self, trial: CheckedEnd) -> list[Case]:
-        """Cases between the listed ones in which a design needs more."""
+        """Find cases between the listed ones in which a design needs larger amounts."""
         cases = trial.end.nlp.cases
         worst = [w.case for w in find_worst_cases(self.problem, trial.parameters).values()]
-        known, needed = (self._compute_amounts(trial.parameters, c) for c in (cases, (*cases, *worst)))
-        grown = any(abs(a) > abs(known.get(n, 0.0)) + FEASIBLE * (1 + abs(a)) for n, a in needed.items())
+        amounts, needed = (self._compute_amounts(trial.parameters, c) for c in (cases, (*cases, *worst)))
+        grown = any(abs(a) > abs(amounts.get(n, 0.0)) + FEASIBLE * (1 + abs(a)) for n, a in needed.items())
         return [case for case in worst if case not in cases] if grown else []
 
     def _compute_amounts(self, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:
-        """The amounts that a design needs, by its own recheck."""
+        """Recheck a design and return the amounts that it needs."""
         needed = measure_excesses(self.problem, parameters, cases)
         for limit in self.limits:
             if limit.parameter:
-                beyond = parameters[limit.parameter] - limit.end
-                needed[limit.name] = max(beyond if limit.upper else -beyond, 0.0)
+                excess = parameters[limit.parameter] - limit.end
+                needed[limit.name] = max(excess if limit.upper else -excess, 0.0)
         amounts = {limit: needed.get(limit.name, 0.0) for limit in self.limits}
         return {n.name: a * (1 + _ROUND_UP) for n, a in amounts.items() if abs(a) > FEASIBLE * n.scale}
 
     def _build_program(self, cases: Sequence[Case]) -> NLP:
-        """Minimise Σ slack/scale with each limit moved by its slack, all others kept."""
+        """Build the program that minimises Σ slack/scale: each limit moves by its slack, all others stay."""
         nlp = formulate(self.problem, cases, elastic=True)
         names = [limit.name for limit in self.limits]
-        new = [variable_name(len(nlp.variables) + k) for k in range(len(names))]
-        slacks = dict(zip(names, map(symbol, new), strict=True))
+        slack_names = [variable_name(len(nlp.variables) + k) for k in range(len(names))]
+        slacks = dict(zip(names, map(symbol, slack_names), strict=True))
         _, *g = fold(nlp.formula, {n: symbol(n) for n in nlp.formula.names}, NODES)
         rows: list[tuple[str, Any, float, float]] = []
-        second: list[tuple[str, Any, float, float]] = []  # last, because touches and kinks refer to rows by number
+        later_rows: list[tuple[str, Any, float, float]] = []  # last, because touches and kinks refer to rows by number
         for name, value, lower, upper in zip(nlp.rows, g, nlp.row_lower, nlp.row_upper, strict=True):
             if name not in slacks:
                 rows.append((name, value, lower, upper))
                 continue
-            moved = [(name, value - slacks[name], -np.inf, upper), (name, value + slacks[name], lower, np.inf)]
-            first, *others = [row for row in moved if np.any(np.isfinite(row[2:]))]
+            sides = [(name, value - slacks[name], -np.inf, upper), (name, value + slacks[name], lower, np.inf)]
+            first, *remaining = [row for row in sides if np.any(np.isfinite(row[2:]))]
             rows.append(first)
-            second += others
-        rows += second
+            later_rows += remaining
+        rows += later_rows
         for limit in self.limits:
             if limit.parameter:
                 value = symbol(nlp.inputs[list(self.problem.free).index(limit.parameter)])
@@ -200,7 +204,7 @@ class ElasticProblem:
             nlp,
             formulation="elastic",
             variables=(*nlp.variables, *(f"slack of {n}" for n in names)),
-            formula=formula([objective, *values], (*nlp.inputs, *new, *nlp.numbers)),
+            formula=formula([objective, *values], (*nlp.inputs, *slack_names, *nlp.numbers)),
             lower=(*nlp.lower, *[0.0] * len(names)),
             upper=(*nlp.upper, *[np.inf] * len(names)),
             rows=row_names,
@@ -210,17 +214,17 @@ class ElasticProblem:
         )
 
     def _guess_slacks(self, values: Sequence[Values], z: Any) -> list[list[float]]:
-        """Initial slacks: what a design needs, and a little more."""
-        found = []
+        """Guess initial slacks: the amounts that a design needs, and a little more."""
+        slacks = []
         for limit in self.limits:
             condition = self.problem.conditions.get(limit.name)
             differences = [abs(float(condition(v))) for v in values] if condition else [0.0]
-            found.append(max(filter(np.isfinite, differences), default=1.0) + 1e-3)
-        return [found]
+            slacks.append(max(filter(np.isfinite, differences), default=1.0) + 1e-3)
+        return [slacks]
 
 
 def list_stages(problem: Posed, options: Options) -> Iterator[ElasticProblem]:
-    """The problem with the limits to move: first the constraints in its own box, then also the box."""
+    """Yield the problem with the limits that may move: first its constraints, then its constraints and its box."""
     constraints = _make_constraint_limits(problem)
     if constraints:
         yield ElasticProblem(problem, constraints, options)
@@ -228,17 +232,17 @@ def list_stages(problem: Posed, options: Options) -> Iterator[ElasticProblem]:
 
 
 def _make_constraint_limits(problem: Posed) -> list[Limit]:
-    """Constraints in units of the limit as written, or of the size of the sides if it is 0 or no number."""
+    """Make limits of the constraints; the scale is the limit as written, or a side's size if that is 0 or no number."""
     ends = [{n: lo + share * (hi - lo) for n, (lo, hi) in problem.free.items()} for share in (0.5, 0.3)]
-    one, other = (problem.values(problem.ordered(design)) for design in ends)
-    found: list[Limit] = []
+    values, other_values = (problem.values(problem.ordered(design)) for design in ends)
+    limits: list[Limit] = []
     for name, condition in problem.conditions.items():
-        pairs = list(zip(condition.sides(one), condition.sides(other), strict=True))
+        pairs = list(zip(condition.sides(values), condition.sides(other_values), strict=True))
         written = [abs(a) for a, b in pairs if a == b != 0]
         sides = [abs(a) for a, _ in pairs if np.isfinite(a) and a]
         size = min(written) if written else max(sides, default=1.0)
-        found.append(Limit(name, size * (1 + _TIE * len(found))))
-    return found
+        limits.append(Limit(name, size * (1 + _TIE * len(limits))))
+    return limits
 
 
 def _make_bound_limits(problem: Posed) -> list[Limit]:
@@ -250,42 +254,42 @@ def _make_bound_limits(problem: Posed) -> list[Limit]:
 
 
 def widen_box(problem: Posed, names: Collection[str]) -> Posed:
-    """The problem with wider ranges of these parameters, inside the physical ones."""
+    """Return the problem with wider ranges of these parameters, inside the physical ranges."""
     free = dict(problem.free)
     for name in names:
         lower, upper = problem.free[name]
         physical, width = problem.parameter_set[name].range, upper - lower
         inset = problem.tolerances.get(name, 0.0) + (0.0 if physical.closed else _INSET * min(width, 1.0))
-        least, most = lower - _WIDER * width, upper + _WIDER * width
-        free[name] = (min(max(least, physical.lower + inset), lower), max(min(most, physical.upper - inset), upper))
+        low, high = lower - _MAX_WIDENING * width, upper + _MAX_WIDENING * width
+        free[name] = (min(max(low, physical.lower + inset), lower), max(min(high, physical.upper - inset), upper))
     return problem.derive(free=free)
 
 
 def relax_each_alone(problem: Posed, options: Options, conflict: Sequence[str], trial: CheckedEnd) -> dict[str, float]:
-    """How far each limit of a conflict must move if no other does; limits that cannot help alone are left out."""
+    """Return how far each limit of a conflict must move if no other limit moves; omit limits that cannot help alone."""
     limits = {limit.name: limit for limit in (*_make_constraint_limits(problem), *_make_bound_limits(problem))}
-    found: dict[str, float] = {}
+    amounts: dict[str, float] = {}
     for limit in (limits[name] for name in conflict):
         wide = widen_box(problem, [limit.parameter] if limit.parameter else [])
         goal = {"minimize" if limit.upper else "maximize": limit.parameter} if limit.parameter else {}
-        if leads := _propose_leads(draw_box(wide.derive(locate=None, **goal), options.seed), limit.name):
-            designs = [clip_to_box(wide, trial.parameters), *leads]
-            found |= ElasticProblem(wide, [limit], options).find_amounts(designs, trial.end.nlp.cases)
-    return found
+        if lead_designs := _propose_designs(draw_box(wide.derive(locate=None, **goal), options.seed), limit.name):
+            designs = [clip_to_box(wide, trial.parameters), *lead_designs]
+            amounts |= ElasticProblem(wide, [limit], options).find_amounts(designs, trial.end.nlp.cases)
+    return amounts
 
 
-def _propose_leads(box: Box, name: str) -> list[dict[str, float]]:
-    """Designs that may need only this limit moved; none if the other limits exclude each other."""
-    found = box.ignore_limit(name)
-    return [] if found.misses_by(box.tuning.far_off) else [*box.designs(found.take_first(_LEADS))]
+def _propose_designs(box: Box, name: str) -> list[dict[str, float]]:
+    """Propose designs for which it may suffice to move this limit; none if the other limits exclude each other."""
+    batch = box.ignore_limit(name)
+    return [] if batch.misses_by(box.tuning.far_off) else [*box.designs(batch.take_first(_STARTS_ALONE))]
 
 
-def _is_least(state: SearchState) -> bool:
-    """Whether nothing must move, or enough starts agree on the least sum."""
+def _has_least_sum(state: SearchState) -> bool:
+    """Whether no limit must move, or enough starts agree on the least sum."""
     objectives = [end.objective for end in state.feasible]
     best = min(objectives, default=np.inf)
-    agreed = sum(same_objective(value, best) for value in objectives) >= _AGREE and len(state.ends) >= 2 * _AGREE
-    return best <= _NOTHING or agreed
+    at_best = sum(same_objective(value, best) for value in objectives)
+    return best <= _ZERO_SUM or (at_best >= _AGREEING_STARTS and len(state.ends) >= 2 * _AGREEING_STARTS)
 
 
-_RELAXING = replace(POLICY, enough=_is_least)
+_RELAXATION_POLICY = replace(POLICY, enough=_has_least_sum)

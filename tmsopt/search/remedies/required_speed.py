@@ -1,8 +1,8 @@
-"""The lowest or highest speed that a design takes where the limits on the roots cannot be met."""
+"""Find the lowest or highest speed at which a design meets the limits on the roots, if none does in the box."""
 
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
@@ -16,79 +16,83 @@ from tmsopt.search.remedies.changed_problem import OutOfTime, limit_time, solve_
 from tmsopt.search.remedies.conflict import STARTS, search_briefly
 from tmsopt.search.state import begin_search
 
-_FASTEST, _TIMES = 10.0, 4.0  # highest speed searched: in √(g w), or in the problem's own highest speed if that is more
-_SECONDS = 0.5  # no second range is searched after this time
-_AT_END = 1e-6  # relative: a speed this close to an end of its range is at that end
+_MAX_SPEED = 10.0  # highest speed that is searched, in √(g w)
+_MAX_SPEED_RATIO = 4.0  # the same, in the highest speed of the problem; the larger of the two counts
+_SECONDS = 0.5  # after this time, the range of speeds below the allowed ones is not searched
+_AT_RANGE_END = 1e-6  # relative: a speed this close to an end of its range is at that end
 
 
-def add_required_speed(solution: Solution, options: Options) -> tuple[Solution, Mapping[str, float] | None]:
+def add_required_speed(solution: Solution, options: Options) -> Solution:
     """Add the lowest or highest speed at which a design exists, if the present one violates the limits on the roots.
 
-    The problem is solved again at the rounded speed that is shown. If the search meets a design inside the box that was
-    missed, return it as well.
+    The problem is solved again at the rounded speed that the report shows.
     """
     problem = solution.problem.posed
     name = _find_speed(problem)
     if not name or problem.cases or not problem.free or not _can_speed_help(solution):
-        return solution, None
+        return solution
     limits = {} if problem.asked_of_roots or problem.pattern else {STABLE: "abscissa <= 0"}
-    few = replace(options, starts=STARTS, progress=None, near=None)
-    began, searched = time.perf_counter(), list[float]()
+    short_options = replace(options, starts=STARTS, progress=None, near=None)
+    began, searched_ends = time.perf_counter(), list[float]()
     begin(options.progress, f"searching for the {name} that makes it feasible")
     for highest, ends in _list_ranges(problem, name):
         goal = {"maximize": name, "minimize": None} if highest else {"minimize": name, "maximize": None}
-        asked = _set_range(problem, name, ends).derive(constraints={**problem.constraints, **limits}, **goal)
-        searched += ends
-        trials = [search_briefly(state) for state in begin_search(asked, few)]
-        found = [t.parameters for t in trials if t and not t.checked.violations]
-        if found:
-            design = (max if highest else min)(found, key=lambda p: p[name])
-            if name in problem.free and math.isclose(design[name], ends[highest], rel_tol=_AT_END):
-                return solution, design
-            short, one = limit_time(options), unit_of(problem, name).one
-            rounded = [round_outwards(design[name] / one, not highest, digits) * one for digits in (DIGITS, 4, 2)]
+        speed_problem = _set_range(problem, name, ends).derive(constraints={**problem.constraints, **limits}, **goal)
+        searched_ends += ends
+        trials = [search_briefly(state) for state in begin_search(speed_problem, short_options)]
+        designs = [t.parameters for t in trials if t and not t.checked.violations]
+        if designs:
+            design = (max if highest else min)(designs, key=lambda p: p[name])
+            if name in problem.free and math.isclose(design[name], ends[highest], rel_tol=_AT_RANGE_END):
+                return solution  # the box has such a design itself, so no other speed is required
+            limited_options, unit_size = limit_time(options), unit_of(problem, name).one
+            rounded = [
+                round_outwards(design[name] / unit_size, not highest, digits) * unit_size for digits in (DIGITS, 4, 2)
+            ]
             with suppress(OutOfTime):
-                for shown in dict.fromkeys(rounded):
-                    fixed = _set_range(problem, name, (shown, shown))
-                    if solve_again(fixed, short, problem, thorough=True):
-                        need = RequiredValue(name, design[name], highest, ends, Table(design), shown)
-                        return replace(solution, need=need), None
-            return solution, None
+                for value in dict.fromkeys(rounded):
+                    fixed_problem = _set_range(problem, name, (value, value))
+                    if solve_again(fixed_problem, limited_options, problem, thorough=True):
+                        need = RequiredValue(name, design[name], highest, ends, Table(design), value)
+                        return replace(solution, need=need)
+            return solution
         if time.perf_counter() - began > _SECONDS:
             break
-    if searched:
-        solution = replace(solution, need=RequiredValue(name, math.nan, False, (min(searched), max(searched))))
-    return solution, None
+    if searched_ends:
+        solution = replace(
+            solution, need=RequiredValue(name, math.nan, False, (min(searched_ends), max(searched_ends)))
+        )
+    return solution
 
 
 def _set_range(problem: Posed, name: str, ends: tuple[float, float]) -> Posed:
-    """The problem with another range of a parameter; with equal ends, the parameter is fixed."""
+    """Return the problem with another range of a parameter; if the ends are equal, the parameter is fixed."""
     free, fixed = {**problem.free, name: ends}, {n: x for n, x in problem.fixed.items() if n != name}
     return problem.derive(fixed=fixed, free={n: free[n] for n in problem.parameter_set.names if n in free}, start={})
 
 
 def _can_speed_help(solution: Solution) -> bool:
-    """Whether another speed may help: the violated limits are on the roots."""
+    """Whether another speed may help, because the violated limits are on the roots."""
     problem = solution.problem.posed
-    about = {*problem.asked_of_roots, *([problem.pattern.name] if problem.pattern else [])}
+    names = {*problem.asked_of_roots, *([problem.pattern.name] if problem.pattern else [])}
     if solution.status == "infeasible":
-        return bool(about & set(solution.violations))
+        return bool(names & set(solution.violations))
     return solution.stable is False and not solution.any_stable and solution.stability_sought
 
 
 def _find_speed(problem: Posed) -> str:
-    """Name of the speed parameter; empty if a constraint on it already limits it."""
-    of = problem.parameter_set
-    name = next((p.name for p in of.parameters if p.unit == "m/s" or p.name == "Fr"), "")
+    """Return the name of the speed parameter; empty if there is none or a constraint uses it."""
+    parameter_set = problem.parameter_set
+    name = next((p.name for p in parameter_set.parameters if p.unit == "m/s" or p.name == "Fr"), "")
     return "" if any(name in c.names for c in problem.conditions.values()) else name
 
 
 def _list_ranges(problem: Posed, name: str) -> Iterator[tuple[bool, tuple[float, float]]]:
-    """Ranges to search: above the allowed speeds, then below them; False, True: whether to maximise the speed."""
+    """Yield (whether to maximise the speed, range): first the range above the allowed speeds, then that below them."""
     low, high = problem.free.get(name, (problem.fixed.get(name, math.nan),) * 2)
     middle = {**problem.fixed, **{n: sum(ends) / 2 for n, ends in problem.free.items()}}
     unit = math.sqrt(middle["g"] * middle["w"]) if {"g", "w"} <= middle.keys() else 1.0
-    top = min(max(_FASTEST * unit, _TIMES * high), problem.parameter_set[name].range.upper)
+    top = min(max(_MAX_SPEED * unit, _MAX_SPEED_RATIO * high), problem.parameter_set[name].range.upper)
     if high < top:
         yield False, (high, top)
     bottom = max(problem.parameter_set[name].range.lower, 0.0)
