@@ -277,7 +277,7 @@ def test_the_first_python_example_runs(monkeypatch):
             "studies.files.LARGEST studies.files.LONGEST_LINE studies.files.MOST_COLUMNS studies.sampling.MOST_ROWS studies.sampling.MOST_NUMBERS",
         ),
         ("a store from another person", "files.LARGEST_JSON studies.store.LARGEST"),
-        ("a chart", "charts.survey.MOST charts.survey.MOST_TILES"),
+        ("a chart", "charts.survey.MAX_DESIGNS charts.survey.MAX_TILES"),
     ],
 )
 def test_limits_of_what_is_read_are_those_in_force(line, constants):

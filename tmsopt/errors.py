@@ -180,6 +180,11 @@ class _Short(reprlib.Repr):
             return f"a whole number of about {round(x.bit_length() * math.log10(2))} digits"
         return repr(x)
 
+    def repr_dict(self, x: dict[Any, Any], level: int) -> str:
+        """The items in their order; `reprlib` would sort them."""
+        items = [f"{key!r}: {self.repr1(value, level - 1)}" for key, value in islice(x.items(), self.maxdict)]
+        return f"{{{', '.join([*items, *['…'] * (len(x) > self.maxdict)])}}}" if level > 0 else "{…}"
+
 
 _SHORT_REPR = _Short()
 vars(_SHORT_REPR).update(

@@ -91,7 +91,7 @@ def test_a_proof_lists_the_numbers_that_it_takes_exactly():
         tmsopt.solve(tmsopt.Problem(from_coefficients([1, "c", "8/3"]), free={"c": (1, 9)}, locate="EP2"))
     )
     assert proof.numbers == ("8/3",)
-    assert "8/3" in proof.report().split("taken exactly:")[1]
+    assert "8/3" in proof.report().split("exact numbers:")[1]
 
 
 @pytest.mark.parametrize(
