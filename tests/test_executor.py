@@ -28,6 +28,7 @@ def local_cluster(workers, **options):
 @pytest.fixture(scope="module")
 def address():
     """A cluster whose scheduler gives up a task after the first worker it ended."""
+    pytest.importorskip("distributed")  # its defaults are set first: the end of `config.set` would remove them
     config = pytest.importorskip("dask").config
     plan = {
         "distributed.scheduler.allowed-failures": 0,

@@ -108,7 +108,7 @@ def _describe_required_speed(solution: Solution, need: RequiredValue) -> str:
         low, high = need.looked
         return f"{subject} {exists} {at}; none was found for {name} from {unit.number(low)} to {unit.show(high)} either"
     extreme, value = "highest" if need.most else "lowest", unit.show(need.shown)
-    return f"{subject} {exists} {at}: the {extreme} {name} found is {value}"
+    return f"{subject} {exists} {at}; the {extreme} {name} found that satisfies all limits is {value}"
 
 
 def _is_unstable(solution: Solution) -> bool:

@@ -222,8 +222,9 @@ def _judge(
     if np.isnan(conditions.curvature):
         return STRICT, 1, f"{name} a strict {extreme}: {active} none of the {unknowns} unknowns free{idle}"
     bend = "downwards" if solution.problem.posed.sense == "maximize" else "upwards"
-    free = f"{active} some of the {unknowns} unknowns free"
-    return STRICT, 2, f"{name} a strict {extreme}: {free}, and the objective curves {bend} in the free directions{idle}"
+    free = f"{count} active condition{'s' * (count != 1)} for {unknowns} unknowns"
+    curved = f"the objective curves {bend} in every direction that they leave free"
+    return STRICT, 2, f"{name} a strict {extreme}: {free}, and {curved}{idle}"
 
 
 def _find_doubt(program: LocalProgram, conditions: Conditions) -> str:

@@ -95,7 +95,7 @@ def _warn_of_active_bounds(solution: Solution) -> Iterator[str]:
     active = [bound for bound in bounds if bound in solution.active and bound not in problem.constraints]
     if arbitrary := [bound for bound in active if not is_physical(problem, bound)]:
         bounds_text = ", ".join(f"{bound} = {_describe_bound(problem, bound)}" for bound in arbitrary)
-        advice = "widen the ends that are guesses, and state real limits under [constraints]"
+        advice = "widen a range whose end is a guess, and state a real limit under [constraints]"
         yield f"the answer depends on these ends of ranges: {bounds_text}; {advice}"
 
 

@@ -18,13 +18,15 @@ from tmsopt.roots import is_stable, roots
 _DIRECTIONS = 1000  # random rays
 _RADII = np.concatenate([[0.0], np.geomspace(1e-4, 4.0, 36)])
 _COARSE, _FINE = (16, 2), (256, 6)
-"""(Parts, rounds) of the bracketing: for all crossings, and to full precision for the selected ones."""
-_MOST_CROSSINGS = 5  # of one edge
+"""(Parts, rounds) of the bracketing: `_COARSE` for all crossings, `_FINE` with full precision for the selected ones."""
+_MAX_CROSSINGS = 5  # of one edge
 _SAME_DIRECTION = 0.9  # cosine above which two directions count as one
-_RANDOM_STARTS = 4  # with 4, nearer points were found for 11 of 196 random systems of degrees 6 to 8; with 6, no more
+_RANDOM_STARTS = (
+    4  # compared with 0, found nearer points in 11 of 196 random systems of degree 6 to 8; 6 found no others
+)
 _POINTS = 400  # tested on the segment from the design to a nearest point
-_RADII_AROUND = np.array([0.1, 0.3, 1.0])
-_STEP = 1e-6  # finite differences with this step only select directions
+_RADII_AROUND_DESIGN = np.array([0.1, 0.3, 1.0])  # at which starts for an optimiser are tried
+_STEP = 1e-6  # of finite differences, which need no accuracy, because they only select directions
 _stable = partial(is_stable, exact=False)  # up to rounding
 
 
@@ -67,7 +69,7 @@ def find_crossings(base: WeightedDesign, rays: Array, t: Array, with_damping: bo
         is_inside = test(c)
         ray, step = np.nonzero(is_inside[:, 1:] != is_inside[:, :-1])
         brackets = _Bracket(base, test, rays[ray], t[step], t[step + 1], is_inside[ray, step]).narrow(*_COARSE)
-        names = [find_crossed_edges(c, heavy) for c in brackets.sides()[0]]
+        names = [find_crossed_edges(c, heavy) for c in brackets.outer_coefficients()[0]]
         distance = np.linalg.norm(base.clip_rays(brackets.rays, brackets.high), axis=1)
         for name in sorted({n for each in names for n in each}):
             rows = [k for k in np.argsort(distance, kind="stable") if name in names[k]]
@@ -91,7 +93,7 @@ def list_directions(base: WeightedDesign) -> Array:
 def find_most_damped(base: WeightedDesign, sign: float) -> list[Array]:
     """The design, and the points around it with the largest damping ratio among those where a0 has the given sign."""
     rays = list_directions(base)
-    u = base.clip_rays(rays[:, None, :], _RADII_AROUND).reshape(-1, rays.shape[1])
+    u = base.clip_rays(rays[:, None, :], _RADII_AROUND_DESIGN).reshape(-1, rays.shape[1])
     c = sign * base.coefficients(u)
     is_start = np.any(u != 0, axis=1) & np.all(np.isfinite(c), axis=1) & (c[:, 0] > 0) & _stable(c)
     u, c = u[is_start], c[is_start]
@@ -110,7 +112,8 @@ def draw_points(base: WeightedDesign, distance: float, seed: int) -> list[Array]
 def _edge_functions(c: Array) -> Array:
     """Functions that vanish on the edges: a0, aₙ, ∏ −(zᵢ + zⱼ) and ∏ (zᵢ − zⱼ)² over pairs of roots, shape (…, 4).
 
-    By Orlando's formula the third is Δₙ₋₁ divided by a power of a0; the fourth is the discriminant divided by one.
+    The third is Δₙ₋₁ divided by a power of a0 (Orlando's formula). The fourth is the discriminant divided by another
+    power of a0.
     """
     proper = np.all(np.isfinite(c), axis=-1) & (c[..., 0] != 0)
     z = roots(np.where(proper[..., None], c, np.eye(c.shape[-1])[0]))
@@ -125,7 +128,7 @@ def _select_different(rays: Array, rows: list[int]) -> NDArray[np.int_]:
     unit = rays / np.linalg.norm(rays, axis=1, keepdims=True)
     selected_rows: list[int] = []
     for k in rows:
-        if len(selected_rows) < _MOST_CROSSINGS and all(
+        if len(selected_rows) < _MAX_CROSSINGS and all(
             float(unit[k] @ unit[selected]) < _SAME_DIRECTION for selected in selected_rows
         ):
             selected_rows.append(k)
@@ -134,7 +137,7 @@ def _select_different(rays: Array, rows: list[int]) -> NDArray[np.int_]:
 
 @dataclass(frozen=True)
 class _Bracket:
-    """Rays with an interval low < t < high in which the result of a test changes; it is `inside` at t = low."""
+    """Rays with an interval low < t < high in which the result of a test changes. `inside` is the result at t = low."""
 
     base: WeightedDesign
     test: Callable[[Array], Truth]
@@ -163,15 +166,15 @@ class _Bracket:
             low, high = t[rays, first - 1], t[rays, first]
         return replace(self, low=low, high=high)
 
-    def sides(self) -> tuple[Array, Array]:
-        """Coefficients outside the edge times the sign that a0 has on the inner side, and this sign."""
+    def outer_coefficients(self) -> tuple[Array, Array]:
+        """Return the coefficients on the outer side, multiplied by the sign of a0 on the inner side, and this sign."""
         inner, outer = (self.coefficients(np.where(self.inside == side, self.low, self.high)) for side in (True, False))
         sign = np.sign(inner[:, 0])
         return sign[:, None] * outer, sign
 
     def crossings(self, heavy: bool) -> list[RayCrossing]:
         """The crossings, one for each ray and edge."""
-        outer, sign = self.sides()
+        outer, sign = self.outer_coefficients()
         u = self.base.clip_rays(self.rays, self.high)
         return [
             RayCrossing(name, float(sign[k]), u[k], float(np.linalg.norm(u[k])))

@@ -251,7 +251,8 @@ def describe_stored(solution: Solution) -> Iterator[str]:
     stored_text = unit_at(problem, "abscissa", case_parameters).number(stored_abscissa, ALL_DIGITS)
     exact_text = show_at(problem, "abscissa", case_parameters, exact_abscissa, ALL_DIGITS)
     yield f"abscissa {exact_text}; with the parameters rounded to doubles {stored_text}"
-    yield ": ".join(describe_roots(solution, ALL_DIGITS))
+    label, text = describe_roots(solution, ALL_DIGITS)
+    yield f"{label} with all digits: {text}"
 
 
 def _time_units(solution: Solution) -> tuple[float, Unit, Unit]:

@@ -101,7 +101,7 @@ def _describe_cost(row: RoundedDesign, explanation: Explanation) -> str:
         cost = _describe_benefit(row, explanation)
     else:
         cost = f"keeps {100 * row.realised / explanation.abscissa:.2g} % of the decay rate"
-    return f"{cost} and violates the limit {', '.join(row.violations)}" if row.violations else cost
+    return f"{cost} and violates the limit {' and '.join(map(repr, row.violations))}" if row.violations else cost
 
 
 def tabulate_rounding(explanation: Explanation) -> TableBlock:
@@ -135,8 +135,8 @@ def write_optimality(optimality: Optimality, _level: Level = "full") -> Parts:
         of_H = optimality.roots[0].eigenfrequency is not None
         root = "an eigenfrequency of the largest Im ω" if of_H else "a root on the rightmost line"
         balance = f"the optimality conditions hold within {optimality.residual:.1g}"
-        yield f"cost in the objective per unit of each change of {root}; {balance}:"
-        head = ("root", f"shift {'down' if of_H else 'to the left'}", "share of all shifts", "split of a multiple root")
+        yield f"cost, in the objective, of moving {root} by one unit; {balance}:"
+        head = ("root", f"cost of a shift {'down' if of_H else 'to the left'}", "share of the cost", "cost of a split")
         rows = [head, *map(_list_root, optimality.roots)]
         is_multiple = any(root.multiplicity > 1 for root in optimality.roots)
         yield TableBlock(rows if is_multiple else [row[:-1] for row in rows], "Multipliers")

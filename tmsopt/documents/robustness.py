@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from tmsopt.boundaries.nearest import Nearest, Robustness
 from tmsopt.documents.blocks import Cell, Chapter, Level, Parts, Sentence, TableBlock, judge
-from tmsopt.models import in_words_of, words_of
+from tmsopt.models import Model, in_words_of, words_of
 from tmsopt.problem.unit_system import unit_of
 
 _MAIN_SHARE = 0.5
@@ -70,7 +70,7 @@ def tabulate_boundaries(robustness: Robustness) -> TableBlock:
             moves = _format_moves(n, robustness.relative)
             places.append(
                 (
-                    f"values at {in_words_of(model, n.kind)}",
+                    f"values at {_name_place(n, model)}",
                     "",
                     *(units[name].show(n.parameters[name], 8) for name in names),
                 )
@@ -94,10 +94,14 @@ def write_nearest(nearest: Nearest, _level: Level) -> Parts:
     yield TableBlock((("", "there", "change in weights"), *rows), "Nearest point of the boundary")
 
 
+def _name_place(n: Nearest, model: Model) -> str:
+    return "a root at infinity" if n.kind == "infinity" else in_words_of(model, n.kind)
+
+
 def _name_row(n: Nearest, robustness: Robustness) -> str:
     prefix = "at the edge of" if n.distance == 0 else "change to"
     if n.kind != "heavy damping":
-        return f"{prefix} {in_words_of(robustness.problem.model, n.kind)}"
+        return f"{prefix} {_name_place(n, robustness.problem.model)}"
     return (
         f"{prefix} {n.kind}"
         if n.distance == 0

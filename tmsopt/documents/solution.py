@@ -234,10 +234,8 @@ def _write_motion(solution: Solution, analysis: Analysis, brief: bool) -> Parts:
 def _write_cases(solution: Solution, worst: Case) -> Parts:
     """Write the worst case, other extreme cases, and a bound for all cases."""
     problem, cover, least_damped, fastest = solution.problem, solution.cover, solution.least_damped, solution.fastest
-    yield Sentence(
-        f"{_describe_case(problem, worst)}; motion and roots belong to this case, all else to the nominal design",
-        "worst case",
-    )
+    case_text = "objective, motion and roots belong to this case, all else to the nominal design"
+    yield Sentence(f"{_describe_case(problem, worst)}; {case_text}", "worst case")
     if least_damped not in (None, worst) and problem.model.carrier is None:
         label = "least damped case found" if problem.tolerances else "least damped case"
         yield Sentence(f"{_describe_case(problem, least_damped)}; the damping ratio belongs to this case", label)
@@ -333,7 +331,9 @@ def _write_search(solution: Solution) -> Parts:
     if starts.tried:
         skipped_count = starts.tried - starts.runs
         skipped_text = (
-            f" ({skipped_count} skipped, because they lead to a known optimum)" if starts.runs and skipped_count else ""
+            f" ({skipped_count} not run but counted, as they lead to a known optimum)"
+            if starts.runs and skipped_count
+            else ""
         )
         sample_text = f"; sample of {starts.looked} designs" if starts.looked else ""
         count_text = (
@@ -362,7 +362,7 @@ def _suggest_more(solution: Solution, analysis: Analysis) -> Sentence:
     }
     command_names = ", ".join(name for name, applies in commands.items() if applies)
     return Sentence(
-        f"--full prints everything; tmsopt {command_names} with the same file" if command_names else "--full",
+        f"--full prints everything; the same file works with tmsopt {command_names}" if command_names else "--full",
         "more",
         "dim",
     )

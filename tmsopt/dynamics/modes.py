@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from tmsopt.records import Array, Complex
 
-_MIN_POINTS, _MIN_SHARE = 3, 1e-4  # fewest points of a piece, and smallest share of the range; rounding makes others
+_MIN_POINTS, _MIN_SHARE = 3, 1e-4
+"""A piece has at least this many points, and this share of the range. Smaller pieces are rounding errors."""
 # two roots meet without a third if their distance is at most this share of the distance to the third
 _ISOLATED_RATIO = 0.5
 
@@ -25,11 +26,11 @@ class Mode:
 
 @dataclass(frozen=True)
 class _Piece:
-    """A range of values with a constant number of real roots: first the real roots, ascending, then the pairs."""
+    """A range of values with a constant number of real roots. Columns of `roots`: real roots, ascending, then pairs."""
 
     values: Array
     roots: Complex
-    real: int
+    real_count: int
 
 
 def follow_modes(
@@ -44,10 +45,10 @@ def follow_modes(
     """Every root between meetings, with the name of its mode.
 
     A root keeps its name where other roots meet. For a bicycle, names begin in a piece with one pair and two real
-    roots: the piece of the design, or over the speed the fastest one. The pair is weave, the left real root castering,
-    the right real root capsize. If there is no such piece, the rightmost pair is weave. For other models, roots are
-    numbered from right to left at the design. A pair that two real roots form has both their names. Where more than two
-    roots meet, as at EP3 and EP4, new names begin.
+    roots: the piece of the design or, if the parameter is the speed, the piece with the highest speeds. The pair is
+    weave, the left real root castering, the right real root capsize. If there is no such piece, the rightmost pair
+    is weave. For other models, roots are numbered from right to left at the design. A pair that two real roots form
+    has both their names. Where more than two roots meet, as at EP3 and EP4, new names begin.
 
     Args:
         values: values of the parameter, ascending, shape (n,).
@@ -60,7 +61,9 @@ def follow_modes(
     parts = _split_pieces(values, roots, multiple_meetings)
     if not parts:
         return ()
-    typical_pieces = [k for k, part in enumerate(parts) if is_bicycle and part.roots.shape[1] == 3 and part.real == 2]
+    typical_pieces = [
+        k for k, part in enumerate(parts) if is_bicycle and part.roots.shape[1] == 3 and part.real_count == 2
+    ]
     design_piece = min(range(len(parts)), key=lambda k: (np.abs(parts[k].values - design).min(), -len(parts[k].values)))
     first = (
         design_piece
@@ -109,8 +112,8 @@ def _match_roots(a: Complex, b: Complex) -> NDArray[np.intp]:
 
 
 def _name_modes(part: _Piece, design: float, is_bicycle: bool) -> list[str]:
-    """Names of a bicycle, or numbers from right to left at the value nearest to the design."""
-    count, row = part.real, part.roots[np.abs(part.values - design).argmin()]
+    """Names of the modes of a bicycle, or numbers from right to left at the value nearest to the design."""
+    count, row = part.real_count, part.roots[np.abs(part.values - design).argmin()]
     pairs = len(row) - count
     if is_bicycle and (count, pairs) == (2, 1):
         return ["castering", "capsize", "weave"]
@@ -123,12 +126,13 @@ def _name_modes(part: _Piece, design: float, is_bicycle: bool) -> list[str]:
 
 def _pass_names(old_piece: _Piece, names: list[str], new_piece: _Piece, forward: bool) -> list[str]:
     """Names of the next piece, from the names of the previous piece; empty unless just two roots meet between them."""
-    if abs(old_piece.real - new_piece.real) != 2:
+    if abs(old_piece.real_count - new_piece.real_count) != 2:
         return []
-    few_reals, many_reals = sorted((old_piece, new_piece), key=lambda piece: piece.real)
+    few_reals, many_reals = sorted((old_piece, new_piece), key=lambda piece: piece.real_count)
+    # roots next to the meeting: r where two more are real, p where these two are a pair
     r, p = (part.roots[-1 if (part is old_piece) == forward else 0] for part in (many_reals, few_reals))
-    i = int(np.diff(r[: many_reals.real].real).argmin())  # real roots i and i + 1 form the pair j
-    j = few_reals.real + int(p[few_reals.real :].imag.argmin())
+    i = int(np.diff(r[: many_reals.real_count].real).argmin())  # real roots i and i + 1 form the pair j
+    j = few_reals.real_count + int(p[few_reals.real_count :].imag.argmin())
     other_reals, other_roots = np.delete(np.arange(len(r)), [i, i + 1]), np.delete(np.arange(len(p)), j)
     distances = [
         np.abs(x - y).min(initial=np.inf)
@@ -137,8 +141,8 @@ def _pass_names(old_piece: _Piece, names: list[str], new_piece: _Piece, forward:
     if abs(r[i + 1] - r[i]) > _ISOLATED_RATIO * distances[0] or 2 * p[j].imag > _ISOLATED_RATIO * distances[1]:
         return []
     # the real roots stay in order; only pairs are matched
-    other_roots[few_reals.real :] = other_roots[few_reals.real :][
-        _match_roots(r[other_reals[few_reals.real :]], p[other_roots[few_reals.real :]])
+    other_roots[few_reals.real_count :] = other_roots[few_reals.real_count :][
+        _match_roots(r[other_reals[few_reals.real_count :]], p[other_roots[few_reals.real_count :]])
     ]
     if many_reals is old_piece:
         pair_name = names[i] if names[i] == names[i + 1] else f"{names[i + 1]} + {names[i]}"

@@ -83,7 +83,7 @@ def add_half_planes(frame: Frame, build: Builder, line: float | None = None) -> 
         largest_root = frame.unit * max(
             frame.bound_roots(build.enclose(frame.coefficients(values, case)), case == cases[0]) for case in cases
         )
-        line_position = build.variable(
+        line_position = build.add_variable(
             "abscissa", -largest_root, largest_root if len(values) == 1 or not frame.needs_contact else math.inf
         )
     for case in cases:
@@ -92,7 +92,7 @@ def add_half_planes(frame: Frame, build: Builder, line: float | None = None) -> 
             build, case, c, frame.bound_roots(build.enclose(c), case == covered_cases[0]), frame.compact
         )
         if line is None and frame.needs_contact and len(covered_cases) == 1:
-            build.row("abscissa", math.prod(contacts), 0.0, 0.0)
+            build.add_row("abscissa", math.prod(contacts), 0.0, 0.0)
     guess = partial(_guess_half_planes, frame, cases, line)
     return LiftedQuantity(constant(line_position), AddedVariable("abscissa", len(build.x) - first_index, guess), (), ())
 
@@ -105,15 +105,15 @@ def add_sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lif
     An odd degree adds a factor s + d, with d ≥ 0 for other ζ only: (1 + ζ)(e − d) = 0, e ≥ 0, e ≥ d.
     """
     first_index, covered_cases, values = len(build.x), build.covered_cases, build.values
-    zeta = build.variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
+    zeta = build.add_variable("damping_ratio", -1.0, 1.0) if ratio is None else ratio
     cases = [case for case in covered_cases if case in frame.signs and (ratio is None or ratio > -1)]
 
     def require_at_least(greater: Any, least: Any) -> None:
-        build.row("damping_ratio", greater - least, 0.0, np.inf)
+        build.add_row("damping_ratio", greater - least, 0.0, np.inf)
 
     def require_equal_unless_real(a: Any, b: Any) -> None:
         """a ≥ b, and a = b for ζ > −1."""
-        build.row("damping_ratio", (1 + zeta) * (a - b), 0.0, 0.0)
+        build.add_row("damping_ratio", (1 + zeta) * (a - b), 0.0, 0.0)
         require_at_least(a, b)
 
     for case in cases:
@@ -121,10 +121,10 @@ def add_sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lif
         root_bound = frame.bound_roots(build.enclose(a), case == covered_cases[0])
         pairs, factors = [], []
         for k in range(1, (len(a) - 1) // 2 + 1):
-            p = build.variable(f"p{k}.{case}", -2 * root_bound, 2 * root_bound)
-            w = build.variable(f"w{k}.{case}", 0.0, root_bound)
+            p = build.add_variable(f"p{k}.{case}", -2 * root_bound, 2 * root_bound)
+            w = build.add_variable(f"w{k}.{case}", 0.0, root_bound)
             q = (
-                build.variable(f"q{k}.{case}", -root_bound * root_bound, root_bound * root_bound)
+                build.add_variable(f"q{k}.{case}", -root_bound * root_bound, root_bound * root_bound)
                 if ratio is None
                 else w * w
             )
@@ -134,13 +134,13 @@ def add_sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lif
             if ratio is None:
                 require_equal_unless_real(w * w, q)
         if len(a) % 2 == 0:
-            d = build.variable(f"d.{case}", 0.0 if ratio is not None else -root_bound, root_bound)
+            d = build.add_variable(f"d.{case}", 0.0 if ratio is not None else -root_bound, root_bound)
             factors.append([1, d])
             if ratio is None:
-                require_equal_unless_real(build.variable(f"e.{case}", 0.0, root_bound), d)
+                require_equal_unless_real(build.add_variable(f"e.{case}", 0.0, root_bound), d)
         for smaller, larger in pairwise(pairs):  # fixes the order of the factors
             require_at_least(larger, smaller)
-        build.equal("damping_ratio", a, [a[0] * c for c in product(*factors)])
+        build.add_equations("damping_ratio", a, [a[0] * c for c in product(*factors)])
     require_at_least(1, zeta)  # real roots would satisfy any larger ratio too
     guess = partial(_guess_sectors, frame, cases, ratio, build.scale.unit)
     return LiftedQuantity(constant(zeta), AddedVariable("damping_ratio", len(build.x) - first_index, guess), (), ())

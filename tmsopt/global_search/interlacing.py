@@ -69,14 +69,14 @@ def add_interlacing(
     # The phase of p(iω) is least if all roots are at −R: degree · atan(ω/R), (degree − 2) π/2 at the last frequency.
     reach = max(1.0, math.tan(math.pi / 2 - math.pi / degree)) if degree > 4 else 1.0
     largest_square = 1.0 if compact else (largest * reach) ** 2
-    unknown_squares = [build.variable(f"x{k}.{case}", 0.0, largest_square) for k in range(1, count + 1)]
+    unknown_squares = [build.add_variable(f"x{k}.{case}", 0.0, largest_square) for k in range(1, count + 1)]
     equations, nonnegative = interlacing_conditions(
         coefficients, [(x, 1 - x if compact else 1) for x in unknown_squares]
     )
     for expression in equations:
-        build.row("abscissa", expression, 0.0, 0.0)
+        build.add_row("abscissa", expression, 0.0, 0.0)
     for expression in nonnegative:
-        build.row("abscissa", expression, 0.0, np.inf)
+        build.add_row("abscissa", expression, 0.0, np.inf)
     signs = nonnegative[len(coefficients) : len(coefficients) + count]
     return [coefficients[-1], *(signs or coefficients[1:2])]
 

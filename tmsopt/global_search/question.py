@@ -79,7 +79,7 @@ class Question:
         lifts: Mapping[str, LiftFunction] = lift_functions
         build = Builder(problem, self.cases, lifts)
         first_case = build.covered_cases[0]
-        build.row("a0", frame.coefficients(build.values, first_case)[0], 0.0, np.inf)
+        build.add_row("a0", frame.coefficients(build.values, first_case)[0], 0.0, np.inf)
         if problem.pattern is not None:
             build.add_pattern(problem.pattern)
             bound_unknowns(frame, build, problem.pattern)
@@ -92,7 +92,7 @@ class Question:
         if self.limit is not None:
             build.add_objective()
             sense = problem.sign
-            build.row("limit", build.objective, -np.inf, sense * self.limit)
+            build.add_row("limit", build.objective, -np.inf, sense * self.limit)
         build.objective = 0
         return build.finish("bound")
 

@@ -14,7 +14,7 @@ from tmsopt.models import MODELS, Model, gain_names
 from tmsopt.models.bicycle_files import read_bicycle
 from tmsopt.problem.advice.names import suggest_key
 from tmsopt.problem.cases import POINTS, Band
-from tmsopt.problem.freedom import find_question_faults
+from tmsopt.problem.freedom import find_objective_faults
 from tmsopt.problem.model_table import stated_model
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
@@ -122,7 +122,7 @@ def as_solvable(source: object, front: bool = False) -> Posed:
     Raises:
         InputError: as for `pose`, and if parameters are free but there is no objective.
     """
-    return _pose(source, lambda problem: [] if front and problem.pareto else find_question_faults(problem))
+    return _pose(source, lambda problem: [] if front and problem.pareto else find_objective_faults(problem))
 
 
 def _pose(source: object, faults_of: Callable[[Posed], list[Fault]]) -> Posed:

@@ -6,7 +6,7 @@ from tmsopt.errors import Fault
 from tmsopt.problem.problem import Posed
 
 
-def find_question_faults(problem: Posed) -> list[Fault]:
+def find_objective_faults(problem: Posed) -> list[Fault]:
     """Faults of a problem that does not ask for one design."""
     if problem.pareto:
         advice = "use tmsopt.pareto, or write minimize with one of the expressions"

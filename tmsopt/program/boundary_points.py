@@ -74,17 +74,17 @@ def lift_boundary_points(
     lifted, first = [], build.size[0]
     for k, point in points.items():
         edge, u = edges[k], [*point.values()]
-        w = [build.variable(f"w.{k}", 0.0)] if edge == "weave" else []
+        w = [build.add_variable(f"w.{k}", 0.0)] if edge == "weave" else []
         equations = _edge_equations(edge, build.polynomial(k), *w)
         slopes = gradients(equations, [*u, *w])
-        multipliers = [build.variable(f"l{j}.{k}") for j in range(len(equations))]
+        multipliers = [build.add_variable(f"l{j}.{k}") for j in range(len(equations))]
         pull = [
             sum((m * row[j] for m, row in zip(multipliers, slopes, strict=True)), x)
             for j, x in enumerate([*u, *[0] * len(w)])
         ]
         for row in (*equations, *pull):
-            build.row("radius", row, 0.0, 0.0)
-        build.row("radius", sum(x * x for x in u) - radius * radius, 0.0, np.inf)
+            build.add_row("radius", row, 0.0, 0.0)
+        build.add_row("radius", sum(x * x for x in u) - radius * radius, 0.0, np.inf)
         gradient = formula(x for row in slopes for x in row)
         lifted.append(_BoundaryPoint(k, tuple(point), [x.value for x in (*u, *w)], len(equations), gradient))
     return AddedVariable(

@@ -53,13 +53,13 @@ from tmsopt.records import Table
 from tmsopt.roots import Pattern
 
 LiftFunction = Callable[["Builder"], LiftedQuantity]
-"""Adds the variables and rows that define a root quantity as its worst value over the covered cases."""
+"""Adds the variables and rows of a root quantity: its worst value over all cases, without those of the radius."""
 
 LIMIT = ".limit"
 """The limit of a constraint `x` is the number `x.limit`."""
 
 _LEEWAY = (
-    1e-9  # a constant branch of a maximum is lowered by this, so that a limit of the same value keeps its multiplier
+    1e-9  # the constant in max(x, constant) is lowered by this, so that it is not active with a limit of the same value
 )
 
 
@@ -70,14 +70,14 @@ def formulate(
     damping_ratio: float | None = None,
     lead: int = 0,
 ) -> NLP:
-    """Formulate a problem, by its pattern if it has one, else by factors, with a variable for each max, min and abs.
+    """Formulate a problem by its pattern, or without a pattern by factors. Each max, min and abs becomes a variable.
 
     Args:
         cases: the variations that the design must withstand; by default only the nominal design.
         elastic: keep every constraint as a row, so that it can be relaxed.
         damping_ratio: fix the damping ratio at 1 (all roots real and negative) or −1 (a positive real root). The
-            recheck tests whether the solution has it.
-        lead: sign of a0 in an NLP whose feasible set includes a0 = 0; 0 otherwise.
+            recheck of the solution tests whether it has this damping ratio.
+        lead: +1 or −1, the sign that a0 keeps while it may become 0; 0 if the NLP excludes a0 = 0.
     """
     matched = formulate_matching(problem, cases=cases) if problem.pattern else None
     nlp = matched or formulate_by_factors(problem, cases, elastic, damping_ratio, lead)
@@ -108,8 +108,8 @@ def formulate_matching(problem: Posed, pattern: Pattern | None = None, cases: Se
     """Match coefficients with a pattern: a_k = a0 · c_k(unknowns).
 
     If there are as many equations as unknowns, the NLP has no objective. With fewer equations it minimises the
-    objective of the problem, or without one the distance to the start in widths of the ranges. With more equations it
-    minimises the sum of the squared mismatches.
+    objective of the problem. If the problem has no objective, it minimises the distance to the start, each parameter in
+    widths of its range. With more equations it minimises the sum of the squared mismatches.
     """
     pattern = pattern or problem.pattern
     if pattern is None:
@@ -148,7 +148,7 @@ class Builder:
 
     Args:
         lift_functions: root quantity → the function that adds it to the NLP; by default as factors.
-        lead: sign of a0 in an NLP whose feasible set includes a0 = 0; 0 otherwise.
+        lead: +1 or −1, the sign that a0 keeps while it may become 0; 0 if the NLP excludes a0 = 0.
     """
 
     def __init__(
@@ -167,18 +167,18 @@ class Builder:
         self.bounds: list[tuple[float, float]] = []
         self.rows: list[tuple[str, Any, float, float]] = []
         self.lifts: list[AddedVariable] = []
-        self.contacts: dict[str, tuple[Contact, ...]] = {}
+        self.contacts: dict[str, tuple[Contact, ...]] = {}  # how roots can lie at the bound that a quantity is
         self.products: list[tuple[Factor, ...]] = []
         self.quantities: dict[str, Any] = {}
         self.fixed_quantities: set[str] = set()
         self.objective: Any = 0
-        self.design = {name: self.parameter(name, *ends) for name, ends in problem.free.items()}
+        self.design = {name: self.add_parameter(name, *ends) for name, ends in problem.free.items()}
         nominal = problem.ordered({**self.design, **{n: symbol(n) for n in problem.fixed if n in self.numbers}})
-        # Cases with a direction belong to a limit on the robustness radius; those with an edge end on a boundary.
+        # A case with a direction belongs to a limit on the robustness radius. If it has an edge, it reaches that edge.
         radius_cases = [k for k, case in enumerate(self.cases, start=1) if case.direction]
-        radius = self.variable(RADIUS, 0.0) if radius_cases else constant(0)
+        radius = self.add_variable(RADIUS, 0.0) if radius_cases else constant(0)
         edges = {k: case.edge for k, case in enumerate(self.cases, start=1) if case.edge}
-        displacements = {k: {n: self.variable(f"{n}.{k}") for n in self.cases[k - 1].direction} for k in edges}
+        displacements = {k: {n: self.add_variable(f"{n}.{k}") for n in self.cases[k - 1].direction} for k in edges}
         parameters = [nominal]
         for k, case in enumerate(self.cases, start=1):
             displaced = replace(case, direction=displacements.get(k, case.direction))
@@ -209,25 +209,25 @@ class Builder:
         extra = (*ROOT_QUANTITIES, NO_RADIUS)
         return Values(problem.model, problem.parameter_set, parameters, extra=extra, lift=lift)
 
-    def variable(self, name: str, lower: float = -np.inf, upper: float = np.inf) -> Any:
+    def add_variable(self, name: str, lower: float = -np.inf, upper: float = np.inf) -> Any:
         self.names.append(name)
         self.x.append(symbol(variable_name(len(self.x))))
         self.bounds.append((lower, upper))
         return self.x[-1]
 
-    def parameter(self, name: str, lower: float, upper: float) -> Any:
+    def add_parameter(self, name: str, lower: float, upper: float) -> Any:
         """A free parameter, as a variable or as the arctangent of one."""
         if self.problem.parameter_set[name].tangent:
-            return make_node("atan", self.variable(f"tan({name})", np.tan(lower), np.tan(upper)))
-        return self.variable(name, lower, upper)
+            return make_node("atan", self.add_variable(f"tan({name})", np.tan(lower), np.tan(upper)))
+        return self.add_variable(name, lower, upper)
 
-    def row(self, name: str, expression: Any, lower: float, upper: float) -> None:
+    def add_row(self, name: str, expression: Any, lower: float, upper: float) -> None:
         self.rows.append((name, constant(expression), lower, upper))
 
-    def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
+    def add_equations(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
         """Equate two lists of coefficients except the leading ones, which agree by construction."""
         for a, b in zip(left[1:], right[1:], strict=True):
-            self.row(name, a - b, 0.0, 0.0)
+            self.add_row(name, a - b, 0.0, 0.0)
 
     def require_real_roots(self) -> None:
         """Require real roots in every case."""
@@ -255,7 +255,7 @@ class Builder:
                 continue
             limit = symbol(name + LIMIT) if name + LIMIT in self.numbers else None
             for value in self.evaluate_cases(condition, limit):
-                self.row(name, value, *condition.allowed)
+                self.add_row(name, value, *condition.allowed)
 
     def add_objective(self) -> None:
         """Add the objective; if it depends on the case, its worst value over the cases."""
@@ -266,30 +266,30 @@ class Builder:
         values = [sign * value for value in self.evaluate_cases(expression)]
         self.objective = values[0]
         if len(values) > 1:
-            self.objective = self.variable("objective")
+            self.objective = self.add_variable("objective")
             worst = partial(worst_guess, sign, expression, tuple(self.covered_cases))
             self.lifts.append(AddedVariable("objective", 1, worst))
             for value in values:
-                self.row("objective", value - self.objective, -np.inf, 0.0)
+                self.add_row("objective", value - self.objective, -np.inf, 0.0)
 
     def evaluate_cases(self, expression: Expression, limit: Any = None) -> list[Any]:
-        """The expression in each covered case if it depends on the case, else in the nominal one; less a limit."""
+        """Values of the expression, minus a limit if given: of each covered case, or the nominal one if all agree."""
         cases = self.covered_cases if depends_on_case(self.problem, expression, self.cases) else [0]
         each = [self.values[k] for k in cases]
         return [expression(v) if limit is None else expression.difference(v, limit) for v in each]
 
     def add_pattern(self, pattern: Pattern) -> None:
-        unknowns = [self.variable(f"{pattern.name}.{u}") for u in pattern.unknowns]
+        unknowns = [self.add_variable(f"{pattern.name}.{u}") for u in pattern.unknowns]
         self.lifts.append(AddedVariable(pattern.name, len(unknowns), lambda v, z: pattern.guesses(z[0])))
         if pattern.abscissa is not None and self.covered_cases == [0]:
             self.quantities["abscissa"] = self.scale.unit * pattern.abscissa(unknowns)
         matched = [self.a[0] * c for c in pattern.monic(unknowns)]
         if degrees_of_freedom(self.problem).count >= 0:
-            self.equal(pattern.name, self.a, matched)
+            self.add_equations(pattern.name, self.a, matched)
         else:
             self.objective = sum((a - b) ** 2 for a, b in zip(self.a, matched, strict=True))
         for expression in pattern.nonnegative(unknowns):
-            self.row(pattern.name, expression, 0.0, np.inf)
+            self.add_row(pattern.name, expression, 0.0, np.inf)
 
     def minimise_distance(self, design: Mapping[str, float]) -> None:
         for name, variable in self.design.items():
@@ -332,7 +332,7 @@ class Builder:
         return [interval(x) for x in fold(formula(expressions), ranges | numbers, INTERVALS)]
 
     def _lift(self, case: int, quantity: Quantity, values: Values) -> Any:
-        """A variable for a quantity that has factors or an equation without division; None if its formula is used."""
+        """A variable, if factors or an equation without division define the quantity; None to use its formula."""
         name = quantity.name
         if name in self.quantities:
             return self.quantities[name]
@@ -349,10 +349,10 @@ class Builder:
         variable, lift = lift_quantity(self, name, case, ends)
         self.lifts.append(lift)
         if quantity.equation is not None:
-            self.row(name, values.fold(quantity.left_side, {name: variable})[0], 0.0, 0.0)
+            self.add_row(name, values.fold(quantity.left_side, {name: variable})[0], 0.0, 0.0)
         for piece in values.fold(quantity.each_piece):
             varies_with_design = depends_on(piece, {x.value for x in self.x})
-            self.row(name, variable - piece, 0.0 if varies_with_design else -_LEEWAY, np.inf)
+            self.add_row(name, variable - piece, 0.0 if varies_with_design else -_LEEWAY, np.inf)
         return variable
 
 
@@ -370,6 +370,6 @@ def _numeric_inputs(problem: Posed, values: Values) -> dict[str, float]:
 
 
 def numbers_of(problem: Posed) -> Mapping[str, float]:
-    """Numbers that an NLP takes as parameters: fixed values and limits. A 0 is a constant of the formulas instead."""
+    """Numbers that an NLP takes as parameters: fixed values and limits. A value 0 is written into the formulas."""
     limits = {name + LIMIT: limit_value(text) for name, text in problem.constraints.items()}
     return Table({name: float(x) for name, x in {**problem.fixed, **limits}.items() if x})

@@ -18,13 +18,13 @@ from tmsopt.roots.patterns.pattern import Roots
 class ProgramBuilder(Protocol):
     """An NLP under construction."""
 
-    def variable(self, name: str, lower: float = ..., upper: float = ...) -> Any:
+    def add_variable(self, name: str, lower: float = ..., upper: float = ...) -> Any:
         """A new variable."""
 
-    def row(self, name: str, expression: Any, lower: float, upper: float) -> None:
+    def add_row(self, name: str, expression: Any, lower: float, upper: float) -> None:
         """A new row."""
 
-    def equal(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
+    def add_equations(self, name: str, left: Sequence[Any], right: Sequence[Any]) -> None:
         """New rows that equate two lists of coefficients."""
 
     def polynomial(self, case: int) -> list[Any]:
@@ -93,14 +93,14 @@ def _lift_by_factors(
         squared: see `Factor`.
     """
     first = build.size[0]
-    edge = build.variable(name, *bounds)
+    edge = build.add_variable(name, *bounds)
     contacts = [] if all_real is None else [Contact(lambda x: all_real, variable=first, value=all_real)]
     lead, products = build.lead, list[tuple[Factor, ...]]()
     for case in build.covered_cases:
         a, factors, monic = build.polynomial(case), list[Factor](), list[list[Any]]()
         count, odd = divmod(len(a) - 1, 2)
         if lead:
-            build.row("a0", lead * a[0], 0.0, np.inf)
+            build.add_row("a0", lead * a[0], 0.0, np.inf)
         for k in range(1, count + 1):
             first_unknown, factor_lead = build.size[0], lead * a[0] if lead and k == 1 and not odd else None
             coefficients, factor_contacts = quadratic(edge, k, case, factor_lead)
@@ -111,12 +111,12 @@ def _lift_by_factors(
                 contacts += factor_contacts
         if odd:
             first_unknown, (letter, lower) = build.size[0], linear
-            monic.append([lead * a[0] if lead else 1, build.variable(f"{letter}.{case}", lower)])
+            monic.append([lead * a[0] if lead else 1, build.add_variable(f"{letter}.{case}", lower)])
             if not lead:
                 factors.append(Factor(first_unknown, linear=True))
             if is_shifted and (not lead or not count):
                 contacts.append(Contact(partial(_step_distance, first_unknown), variable=first_unknown))
-        build.equal(name, shift(a, edge) if is_shifted else a, [(lead or a[0]) * c for c in product(*monic)])
+        build.add_equations(name, shift(a, edge) if is_shifted else a, [(lead or a[0]) * c for c in product(*monic)])
         products.append(tuple(factors))
     scale = abs(lead) / build.scale.lead
     guesses = (
@@ -137,7 +137,7 @@ def lift_abscissa(build: ProgramBuilder) -> LiftedQuantity:
 
     def quadratic(gamma: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
         index = build.size[0]
-        beta, kappa = build.variable(f"beta{k}.{case}", 0.0), build.variable(f"kappa{k}.{case}", 0.0)
+        beta, kappa = build.add_variable(f"beta{k}.{case}", 0.0), build.add_variable(f"kappa{k}.{case}", 0.0)
         distances = (_pair_distance, _real_distance)
         contacts = [Contact(partial(distance, index), variable=index + j) for j, distance in enumerate(distances)]
         return [1 if lead is None else lead, beta, kappa], contacts
@@ -163,11 +163,11 @@ def lift_damping_ratio(build: ProgramBuilder) -> LiftedQuantity:
 
     def quadratic(zeta: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
         index = build.size[0]
-        p, w, m = build.variable(f"p{k}.{case}"), build.variable(f"w{k}.{case}", 0.0), 1.0
+        p, w, m = build.add_variable(f"p{k}.{case}"), build.add_variable(f"w{k}.{case}", 0.0), 1.0
         if lead is not None:
-            m = build.variable(f"m.{case}", 0.0)
-            build.row("damping_ratio", m * m - lead, 0.0, 0.0)
-        build.row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
+            m = build.add_variable(f"m.{case}", 0.0)
+            build.add_row("damping_ratio", m * m - lead, 0.0, 0.0)
+        build.add_row("damping_ratio", p - 2 * zeta * m * w, 0.0, np.inf)
         return [m * m, p, w * w], [Contact(partial(_sector_distance, index), row=build.size[1] - 1)]
 
     def place(is_near: bool, z: Roots, size: float) -> float:
@@ -187,8 +187,8 @@ def lift_angular_frequency(build: ProgramBuilder) -> LiftedQuantity:
 
     def quadratic(omega: Any, k: int, case: int, lead: Any) -> tuple[list[Any], list[Contact]]:
         index = build.size[0]
-        p, q, m = build.variable(f"p{k}.{case}"), build.variable(f"q{k}.{case}"), 1 if lead is None else lead
-        build.row("angular_frequency", p * p + 4 * m * m * omega * omega - 4 * m * q, 0.0, np.inf)
+        p, q, m = build.add_variable(f"p{k}.{case}"), build.add_variable(f"q{k}.{case}"), 1 if lead is None else lead
+        build.add_row("angular_frequency", p * p + 4 * m * m * omega * omega - 4 * m * q, 0.0, np.inf)
         return [m, p, q], [Contact(partial(_strip_distance, index), row=build.size[1] - 1)]
 
     def place(is_near: bool, z: Roots, size: float) -> float:
@@ -205,8 +205,8 @@ def lift_positive_root(build: ProgramBuilder) -> AddedVariable:
     """A damping ratio of −1 in the only case: p = a0 (s − r) q(s), r ≥ 0."""
     (case,) = build.covered_cases
     a = build.polynomial(case)
-    r, *q = build.variable("r", 0.0), *(build.variable(f"q{k}") for k in range(1, len(a) - 1))
-    build.equal("damping_ratio", a, [a[0] * c for c in product([1, -r], [1, *q])])
+    r, *q = build.add_variable("r", 0.0), *(build.add_variable(f"q{k}") for k in range(1, len(a) - 1))
+    build.add_equations("damping_ratio", a, [a[0] * c for c in product([1, -r], [1, *q])])
     return AddedVariable("r", len(a) - 1, partial(_positive_guess, case))
 
 
@@ -220,15 +220,15 @@ def lift_real_roots(build: ProgramBuilder, line: bool) -> LiftedQuantity:
         line: whether γ is a variable, the abscissa; otherwise γ = 0.
     """
     cases, first = build.covered_cases, build.size[0]
-    gamma = build.variable("abscissa", upper=0.0) if line else 0.0
+    gamma = build.add_variable("abscissa", upper=0.0) if line else 0.0
     contacts: list[Contact] = []
     for case in cases:
         a = build.polynomial(case)
         index = build.size[0]
-        steps = [build.variable(f"d{k}.{case}", 0.0) for k in range(1, len(a))]
+        steps = [build.add_variable(f"d{k}.{case}", 0.0) for k in range(1, len(a))]
         contacts.append(Contact(partial(_step_distance, index), variable=index))
         distances = [sum(steps[:k], 0) for k in range(1, len(a))]
-        build.equal("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, d] for d in distances))])
+        build.add_equations("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, d] for d in distances))])
     lift = AddedVariable("abscissa", build.size[0] - first, partial(_real_guess, cases, line))
     return LiftedQuantity(build.scale.unit * gamma, lift, tuple(contacts), ())
 
@@ -239,20 +239,20 @@ def lift_radius(build: ProgramBuilder, directions: Sequence[int]) -> AddedVariab
     for case in directions:
         a = build.polynomial(case)
         monic = [
-            [1, build.variable(f"b{k}.{case}", 0.0), build.variable(f"c{k}.{case}", 0.0)]
+            [1, build.add_variable(f"b{k}.{case}", 0.0), build.add_variable(f"c{k}.{case}", 0.0)]
             for k in range(1, (len(a) - 1) // 2 + 1)
         ]
         if len(a) % 2 == 0:
-            monic.append([1, build.variable(f"b.{case}", 0.0)])
+            monic.append([1, build.add_variable(f"b.{case}", 0.0)])
         size += len(a) - 1
-        build.row("radius", a[0] * build.polynomial(0)[0], 0.0, np.inf)
-        build.equal("radius", a, [a[0] * c for c in product(*monic)])
+        build.add_row("radius", a[0] * build.polynomial(0)[0], 0.0, np.inf)
+        build.add_equations("radius", a, [a[0] * c for c in product(*monic)])
     return AddedVariable("directions", size, partial(_radius_guess, directions))
 
 
 def lift_quantity(build: ProgramBuilder, name: str, case: int, ends: tuple[float, float]) -> tuple[Any, AddedVariable]:
     """A variable for a derived quantity; the caller adds the equation without division that defines it."""
-    symbol = build.variable(name if case == 0 else f"{name}.{case}", *ends)
+    symbol = build.add_variable(name if case == 0 else f"{name}.{case}", *ends)
     return symbol, AddedVariable(name, 1, lambda values, z: [[_finite(values[case][name])]])
 
 

@@ -91,7 +91,7 @@ def stability_verdict(factorisation: Factorisation, of_H: bool = False) -> Verdi
         )
     if factorisation.stable is None:
         return Verdict(
-            None, "a Routh–Hurwitz expression is 0 up to its error: more --digits decide unless it is exactly 0"
+            None, "a Routh–Hurwitz expression is 0 within its error; a larger --digits decides, unless it is exactly 0"
         )
     roots = factorisation.roots or ()
     axis_roots = [z for z in roots if z.re == 0]
@@ -107,7 +107,7 @@ def stability_verdict(factorisation: Factorisation, of_H: bool = False) -> Verdi
 def heavy_damping_verdict(factorisation: Factorisation) -> Verdict:
     """Whether all roots are real and negative, and whether they are also different."""
     if factorisation.heavily_damped is None:
-        return Verdict(None, "some roots may be real or complex: more --digits decide unless they coincide")
+        return Verdict(None, "some roots may be real or complex; a larger --digits decides, unless they coincide")
     if not factorisation.heavily_damped:
         return Verdict(False, "a root is complex" if factorisation.stable else "a root is not negative")
     if any(multiplicity > 1 for _, multiplicity in factorisation.factors) or factorisation.roots is None:

@@ -92,8 +92,8 @@ def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
     A polynomial with a leading coefficient 0 has a root at infinity and counts as unstable.
 
     Args:
-        exact: whether exact arithmetic decides if rounding errors could change a sign, in about 0.1 ms a polynomial;
-            the given doubles count as exact. Only for degrees above 4: up to 4, the conditions in doubles decide.
+        exact: use exact arithmetic where rounding errors could change a sign (about 0.1 ms a polynomial). The given
+            doubles count as exact numbers. Without effect up to degree 4: there the conditions in doubles decide.
 
     Raises:
         ValueError: for fewer than two coefficients.
@@ -141,7 +141,7 @@ def discriminant(coefficients: Coefficients) -> Any:
 
     For a quartic it is (4 I³ − J²)/27 with the invariants I and J, and does not change sign at the sets 2EP2
     and CEP2, where it has a squared factor. From degree 5 it is the Bézout determinant of p′ and n p − s p′, divided by
-    n^(n−2); this takes n 2ⁿ products, and this division is the only one.
+    n^(n−2). The determinant takes n 2ⁿ products and no division.
 
     Raises:
         ValueError: for degree 0 or 1.
@@ -168,7 +168,7 @@ def discriminant(coefficients: Coefficients) -> Any:
 
 def _bezout_discriminant(c: Coefficients) -> Any:
     n = len(c) - 1
-    derivative = [(n - k) * c[k] for k in range(n)][::-1]  # ascending, as in Bézout's matrix
+    derivative = [(n - k) * c[k] for k in range(n)][::-1]  # p′, ascending, as in Bézout's matrix
     remainder = [(k + 1) * c[k + 1] for k in range(n)][::-1]
 
     def entry(i: int, j: int) -> list[Any]:

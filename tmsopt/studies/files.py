@@ -16,7 +16,7 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr
 from tmsopt.errors import LISTED, Fault, InputError, count_faults, escape_unprintable, is_number, short, suggest
 from tmsopt.files import read_lines
 from tmsopt.problem.files import as_solvable, problem_from_tables
-from tmsopt.problem.freedom import find_question_faults
+from tmsopt.problem.freedom import find_objective_faults
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.toml import Key, Number, Page, Section, read_page, validate_tables
 from tmsopt.problem.unit_system import dimension_of, si_units
@@ -387,7 +387,7 @@ def _read_problem(page: Page, title: str, faults: list[Fault]) -> Problem | None
     source = page.data.get("problem")
     if isinstance(source, dict):
         problem_faults, problem = problem_from_tables(source, str(page.data.get("title", "")).strip() or title)
-        faults += _prefix_keys([*problem_faults, *(find_question_faults(problem.posed) if problem else ())], "problem")
+        faults += _prefix_keys([*problem_faults, *(find_objective_faults(problem.posed) if problem else ())], "problem")
         return problem
     if isinstance(source, str):  # anything else is reported as a fault of shape
         try:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError, count_faults, is_number, limit_advice, short, suggest, text_faults
 from tmsopt.problem.files import Given, pose
-from tmsopt.problem.freedom import find_question_faults
+from tmsopt.problem.freedom import find_objective_faults
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.verdict.status import NotSolved
@@ -31,7 +31,7 @@ _DEVIATIONS_PER_TOLERANCE = 3  # a tolerance is this many standard deviations of
 
 @dataclass(frozen=True)
 class Sampling:
-    """A Monte Carlo study whose nominal design is not solved yet; `run_study` solves it first.
+    """A Monte Carlo study whose nominal design is not known yet; `run_study` computes it first.
 
     Attributes:
         problem: its optimum is the nominal design, and its tolerances are used if `tolerances` is empty.
@@ -66,7 +66,7 @@ class Sampling:
     def __post_init__(self) -> None:
         posed = pose(self.problem)
         tolerances = self.tolerances or posed.tolerances
-        faults = [*find_question_faults(posed), *_tolerance_faults(posed, tolerances)]
+        faults = [*find_objective_faults(posed), *_tolerance_faults(posed, tolerances)]
         faults += [*common_faults(posed, self.seed, self.starts, self.report), *text_faults(self.title, "title")]
         faults += count_faults("rows", self.rows, 1, MOST_ROWS)
         if self.distribution not in DISTRIBUTIONS:
@@ -191,7 +191,7 @@ def _check_store_matches(request: Sampling, store: Path) -> None:
 
 
 def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:
-    """Faults of tolerances that may be of any type."""
+    """Faults of the tolerances, an argument that is not checked yet and may have any type."""
     if not isinstance(tolerances, Mapping) or not tolerances:
         text = f"found {short(tolerances)}" if tolerances else "no tolerances"
         accepted = "parameters with their largest error, such as lambda_s = 0.01"

@@ -23,7 +23,7 @@ from tmsopt.errors import (
 from tmsopt.models.expression import ExpressionError
 from tmsopt.problem.cases import Band
 from tmsopt.problem.files import Given, pose
-from tmsopt.problem.freedom import find_question_faults
+from tmsopt.problem.freedom import find_objective_faults
 from tmsopt.problem.limit import limit_value, replace_limit
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.program.options import STARTS
@@ -230,7 +230,7 @@ def faults(study: UncheckedStudy) -> Iterator[Fault]:
         message = f"found {short(study.problem)}; accepted: a Problem, such as tmsopt.load('problems/least_speed.toml')"
         yield Fault(message, ("problem",))
         return
-    yield from (Fault(f.message, ("problem", *f.key)) for f in find_question_faults(study.problem.posed))
+    yield from (Fault(f.message, ("problem", *f.key)) for f in find_objective_faults(study.problem.posed))
     if isinstance(study.columns, Mapping):
         yield from _column_faults(study)
     else:
