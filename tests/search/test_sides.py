@@ -73,7 +73,7 @@ def test_a_side_without_a_design_is_said_to_have_none():
     assert design.value == pytest.approx(alone.value, abs=1e-9)
     assert design.sides[FORWARD] == design.value
     assert isnan(design.sides[BACKWARD])
-    assert any("with reversed rake nothing feasible" in n for n in design.notes)
+    assert any("no feasible design with reversed rake" in n for n in design.notes)
     assert json.loads(json.dumps(design.to_json()))["sides"][BACKWARD] is None
 
 

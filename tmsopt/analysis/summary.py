@@ -95,8 +95,8 @@ def _warn_of_active_bounds(solution: Solution) -> Iterator[str]:
     active = [bound for bound in bounds if bound in solution.active and bound not in problem.constraints]
     if arbitrary := [bound for bound in active if not is_physical(problem, bound)]:
         bounds_text = ", ".join(f"{bound} = {_describe_bound(problem, bound)}" for bound in arbitrary)
-        advice = "widen a range whose end is a guess, and state a real limit under [constraints]"
-        yield f"the answer depends on these ends of ranges: {bounds_text}; {advice}"
+        advice = "widen a guessed range, and state a real limit as a constraint"
+        yield f"ends of ranges limit the design: {bounds_text}; {advice}"
 
 
 def _describe_bound(problem: Posed, bound: str) -> str:

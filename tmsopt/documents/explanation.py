@@ -74,7 +74,7 @@ def describe_rounding(explanation: Explanation) -> str:
         parts.append(f"to {ALONE} digits the design is unstable{worst}")
     last = fewest or rows[-1]
     effect = (_describe_benefit if fewest else _describe_cost)(last, explanation)
-    parts.append(f"to {last.digits} digits the design {effect}")
+    parts.append(f"to {last.digits} digits {'it' if parts else 'the design'} {effect}")
     needs = f"; {explanation.worst} needs the most digits" if explanation.worst and not unstable else ""
     return f"{'; '.join(parts)}{needs}"
 

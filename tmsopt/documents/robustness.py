@@ -48,9 +48,9 @@ def describe_robustness(robustness: Robustness, on_edge: bool = False) -> str:
     if not limit.found:
         return f"{'' if robustness.stable else 'not stable; '}the search found no change that makes it {new_state}"
     if not robustness.stable:
-        return f"not stable; {_describe_size(robustness)} makes it stable{_name_largest(limit)}"
-    cause = words_of(robustness.problem.model).get(limit.kind, "a root passes through infinity, a0 = 0")
-    return f"{_describe_size(robustness)} makes it unstable ({cause}){_name_largest(limit)}"
+        return f"not stable; {_describe_size(robustness)}{_name_largest(limit)} makes it stable"
+    cause = words_of(robustness.problem.model).get(limit.kind, "a root at infinity, a0 = 0")
+    return f"{_describe_size(robustness)}{_name_largest(limit)} makes it unstable ({cause})"
 
 
 def tabulate_boundaries(robustness: Robustness) -> TableBlock:
@@ -121,7 +121,7 @@ def _name_largest(limit: Nearest) -> str:
     changes = sorted(limit.direction.items(), key=lambda item: -abs(item[1]))
     largest = abs(changes[0][1])
     names = [n for n, x in changes if largest > 0 and abs(x) >= _MAIN_SHARE * largest]
-    return f"; largest changes: {', '.join(names[:_MAX_NAMES])}" if names and len(changes) > 1 else ""
+    return f", mostly in {' and '.join(names[:_MAX_NAMES])}," if names and len(changes) > 1 else ""
 
 
 def _describe_size(robustness: Robustness) -> str:

@@ -227,7 +227,7 @@ def _write_motion(solution: Solution, analysis: Analysis, brief: bool) -> Parts:
     if "load_rear" in solution.quantities:
         yield Sentence(f"{describe_loads(solution)}; {describe_pitching(solution)}", "loads")
     yield Sentence(solution.problem.model.omits, "model")
-    inertia = "largest inertia before it becomes unstable, one at a time (radius of gyration)"
+    inertia = "largest stable inertia, one at a time (radius of gyration)"
     yield Sentence(describe_inertia(solution), inertia)
 
 
