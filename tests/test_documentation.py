@@ -226,7 +226,7 @@ def test_the_times_stand_in_the_results():
     results = (ROOT / "benchmarks" / "results.md").read_text(encoding="utf-8")
     table = {row[0]: row[1] for row in re.findall(r"^\| (.*?) +\| (.*) \|$", README.read_text(), re.MULTILINE)}
     finds, proves = (
-        next(cells for row, cells in table.items() if row.startswith(word)) for word in ("finds the", "proves it")
+        next(cells for row, cells in table.items() if row.startswith(word)) for word in ("finds the", "proves that")
     )
     medians = [
         *(

@@ -51,7 +51,16 @@ def test_it_fits_a_screen_in_one_unit_each(file):
         assert units <= {unit_of(design.problem.posed, name).text}, name
     full = design.report(full=True).splitlines() if file.stem in QUICK else []
     headed = [name for name, below in pairwise(full) if below and set(below) == {"-"}]
-    order = ["Answer", "Conflict", "Parameters", "Motion", "Cases", "Limits", "How certain it is", "Roots"]
+    order = [
+        "Answer",
+        "Conflict",
+        "Parameters",
+        "Motion",
+        "Cases",
+        "Limits",
+        "Robustness, rounding and optimality",
+        "Roots",
+    ]
     order += ["Derived quantities", "Search"]
     assert headed == [name for name in order if name in headed]
 

@@ -95,11 +95,11 @@ def test_squared_frequencies_of_equal_roots_are_within_their_range(degree):
     upper = []
 
     class Rows:
-        def variable(self, name, lower, most):
+        def add_variable(self, name, lower, most):
             upper.append(most)
             return 0.0
 
-        def row(self, *_): ...
+        def add_row(self, *_): ...
 
     coefficients = [float(math.comb(degree, k)) for k in range(degree + 1)]
     add_interlacing(Rows(), 0, coefficients, 1.0, False)

@@ -43,7 +43,7 @@ def infeasible_sentences(solution: Solution, full: bool = False) -> list[str]:
         " and ".join(_describe_change(problem, *limit) for limit in remedy.items()) for remedy in relaxation.remedies
     ]
     if not changes:
-        return lines if need and need.found else [*lines, "of the changes of limits that were tried, none helps"]
+        return lines if need and need.found else [*lines, "none of the changes of limits that were tried helps"]
     return [*lines, f"smallest change found: {changes[0]}", *(f"or alone: {text}" for text in changes[1:] if full)]
 
 
@@ -108,7 +108,7 @@ def _describe_required_speed(solution: Solution, need: RequiredValue) -> str:
         low, high = need.looked
         return f"{subject} {exists} {at}; none was found for {name} from {unit.number(low)} to {unit.show(high)} either"
     extreme, value = "highest" if need.most else "lowest", unit.show(need.shown)
-    return f"{subject} {exists} {at}; the {extreme} {name} found that satisfies all limits is {value}"
+    return f"{subject} {exists} {at}; the {extreme} {name} found at which all other limits hold is {value}"
 
 
 def _is_unstable(solution: Solution) -> bool:

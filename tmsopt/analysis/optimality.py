@@ -223,7 +223,7 @@ def _judge(
         return STRICT, 1, f"{name} a strict {extreme}: {active} none of the {unknowns} unknowns free{idle}"
     bend = "downwards" if solution.problem.posed.sense == "maximize" else "upwards"
     free = f"{count} active condition{'s' * (count != 1)} for {unknowns} unknowns"
-    curved = f"the objective curves {bend} in every direction that they leave free"
+    curved = f"in every direction that these leave free the objective curves {bend}"
     return STRICT, 2, f"{name} a strict {extreme}: {free}, and {curved}{idle}"
 
 

@@ -21,9 +21,7 @@ _COARSE, _FINE = (16, 2), (256, 6)
 """(Parts, rounds) of the bracketing: `_COARSE` for all crossings, `_FINE` with full precision for the selected ones."""
 _MAX_CROSSINGS = 5  # of one edge
 _SAME_DIRECTION = 0.9  # cosine above which two directions count as one
-_RANDOM_STARTS = (
-    4  # compared with 0, found nearer points in 11 of 196 random systems of degree 6 to 8; 6 found no others
-)
+_RANDOM_STARTS = 4  # with 4 instead of none, 11 of 196 random systems had nearer points; with 6, no more systems had
 _POINTS = 400  # tested on the segment from the design to a nearest point
 _RADII_AROUND_DESIGN = np.array([0.1, 0.3, 1.0])  # at which starts for an optimiser are tried
 _STEP = 1e-6  # of finite differences, which need no accuracy, because they only select directions
@@ -68,7 +66,7 @@ def find_crossings(base: WeightedDesign, rays: Array, t: Array, with_damping: bo
     for heavy, test in ((False, _stable), (True, is_heavily_damped))[: 1 + with_damping]:
         is_inside = test(c)
         ray, step = np.nonzero(is_inside[:, 1:] != is_inside[:, :-1])
-        brackets = _Bracket(base, test, rays[ray], t[step], t[step + 1], is_inside[ray, step]).narrow(*_COARSE)
+        brackets = _Brackets(base, test, rays[ray], t[step], t[step + 1], is_inside[ray, step]).narrow(*_COARSE)
         names = [find_crossed_edges(c, heavy) for c in brackets.outer_coefficients()[0]]
         distance = np.linalg.norm(base.clip_rays(brackets.rays, brackets.high), axis=1)
         for name in sorted({n for each in names for n in each}):
@@ -136,7 +134,7 @@ def _select_different(rays: Array, rows: list[int]) -> NDArray[np.int_]:
 
 
 @dataclass(frozen=True)
-class _Bracket:
+class _Brackets:
     """Rays with an interval low < t < high in which the result of a test changes. `inside` is the result at t = low."""
 
     base: WeightedDesign
@@ -146,7 +144,7 @@ class _Bracket:
     high: Array
     inside: Truth
 
-    def select(self, k: NDArray[np.int_]) -> "_Bracket":
+    def select(self, k: NDArray[np.int_]) -> "_Brackets":
         """The rays with these indices."""
         return replace(self, rays=self.rays[k], low=self.low[k], high=self.high[k], inside=self.inside[k])
 
@@ -155,7 +153,7 @@ class _Bracket:
         rays = self.rays if t.ndim == 1 else self.rays[:, None, :]
         return self.base.coefficients(self.base.clip_rays(rays, t))
 
-    def narrow(self, parts: int, rounds: int) -> "_Bracket":
+    def narrow(self, parts: int, rounds: int) -> "_Brackets":
         """Narrow each bracket to its first change, testing several points per call."""
         low, high = self.low, self.high
         rays = np.arange(len(low))

@@ -135,8 +135,13 @@ def write_optimality(optimality: Optimality, _level: Level = "full") -> Parts:
         of_H = optimality.roots[0].eigenfrequency is not None
         root = "an eigenfrequency of the largest Im ω" if of_H else "a root on the rightmost line"
         balance = f"the optimality conditions hold within {optimality.residual:.1g}"
-        yield f"cost, in the objective, of moving {root} by one unit; {balance}:"
-        head = ("root", f"cost of a shift {'down' if of_H else 'to the left'}", "share of the cost", "cost of a split")
+        yield f"increase of the objective if {root} moves by one unit ({balance}):"
+        head = (
+            "root",
+            f"if it moves {'down' if of_H else 'to the left'}",
+            "share of the total",
+            "if a multiple root splits",
+        )
         rows = [head, *map(_list_root, optimality.roots)]
         is_multiple = any(root.multiplicity > 1 for root in optimality.roots)
         yield TableBlock(rows if is_multiple else [row[:-1] for row in rows], "Multipliers")
@@ -172,8 +177,8 @@ def _describe_root(diagnosis: Diagnosis) -> str:
         jordan = diagnosis.jordan
         zero = f"{jordan.zero:.1g}" if jordan.zero > _SMALLEST_SHOWN else f"below {_SMALLEST_SHOWN:g}"
         reason = vectors + (f" instead of {diagnosis.algebraic}" if diagnosis.geometric < diagnosis.algebraic else "")
-        reason += f": relative to the largest singular value of its matrix, {zero} counts as 0"
-        reason += f", the next one is {jordan.nonzero:.2g}" if jordan.nonzero < math.inf else ""
+        reason += f"; singular values of the matrix, divided by the largest: {zero} counts as 0"
+        reason += f", the next is {jordan.nonzero:.2g}" if jordan.nonzero < math.inf else ""
     lengths = ", ".join(map(str, diagnosis.partial))
     plural = "s" if len(diagnosis.partial) > 1 else ""
     chains = f"Jordan chain{plural} of length {lengths}" if diagnosis.partial else "chains not decided"

@@ -137,9 +137,9 @@ def _describe_method(problem: Posed, proof: Proof) -> Parts:
         constraint_text = " and the == constraints" if equations else ""
         equation = "a_k = a0 c_k, c_k the coefficients of the pattern"
         yield Sentence(f"Krawczyk's interval Newton test on the equations {equation}{constraint_text}", "method")
-        uniqueness = f"no other such design has all numbers within {proof.uniqueness:.2g} of these"
+        uniqueness = f"no other such design has every number within {proof.uniqueness:.2g} of these"
         yield f"error at most {proof.radius:.1e} before rounding to these digits; {uniqueness}"
-        rounding_text = f"rounding to doubles alone can cause {proof.explained:.1e}"
+        rounding_text = f"rounding alone can cause a difference of {proof.explained:.1e}"
         yield f"the stored design differs from the proved one by {proof.distance:.1e}; {rounding_text}"
 
 

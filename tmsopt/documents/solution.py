@@ -109,7 +109,7 @@ def write_solution(
     yield Chapter("limits", width="wide")
     yield from _write_limits(solution, explanation, full, page)
     if not brief:
-        yield Chapter("sureness", "How certain it is")
+        yield Chapter("sureness", "Robustness, rounding and optimality")
     yield from _write_sureness(solution, explanation, brief, full)
     if brief:
         yield _suggest_more(solution, analysis)

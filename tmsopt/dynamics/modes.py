@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tmsopt.records import Array, Complex
 
 _MIN_POINTS, _MIN_SHARE = 3, 1e-4
-"""A piece has at least this many points, and this share of the range. Smaller pieces are rounding errors."""
+"""Least number of points and least share of all values of a `_Piece`; smaller pieces are rounding errors."""
 # two roots meet without a third if their distance is at most this share of the distance to the third
 _ISOLATED_RATIO = 0.5
 
@@ -44,11 +44,11 @@ def follow_modes(
 ) -> tuple[Mode, ...]:
     """Every root between meetings, with the name of its mode.
 
-    A root keeps its name where other roots meet. For a bicycle, names begin in a piece with one pair and two real
-    roots: the piece of the design or, if the parameter is the speed, the piece with the highest speeds. The pair is
-    weave, the left real root castering, the right real root capsize. If there is no such piece, the rightmost pair
-    is weave. For other models, roots are numbered from right to left at the design. A pair that two real roots form
-    has both their names. Where more than two roots meet, as at EP3 and EP4, new names begin.
+    A root keeps its name where other roots meet. For a bicycle, the naming starts from a piece with one pair and
+    two real roots: the piece of the design or, if the parameter is the speed, the piece with the highest speeds.
+    The pair is weave, the left real root castering, the right real root capsize. If there is no such piece, the
+    rightmost pair is weave. For other models, roots are numbered from right to left at the design. A pair that two
+    real roots form has both their names. Where more than two roots meet, as at EP3 and EP4, new names begin.
 
     Args:
         values: values of the parameter, ascending, shape (n,).
@@ -101,7 +101,7 @@ def _split_pieces(values: Array, roots: Complex, multiple_meetings: Sequence[flo
 
 
 def _match_roots(a: Complex, b: Complex) -> NDArray[np.intp]:
-    """Indices of b matched one to one to a, with the least sum of squared distances."""
+    """Indices that assign one root of `b` to each root of `a`, with the least sum of squared distances."""
     squares = np.abs(a[:, None] - b) ** 2
     if len(a) <= 2:  # always so for a bicycle
         order = np.arange(len(a))
@@ -129,7 +129,7 @@ def _pass_names(old_piece: _Piece, names: list[str], new_piece: _Piece, forward:
     if abs(old_piece.real_count - new_piece.real_count) != 2:
         return []
     few_reals, many_reals = sorted((old_piece, new_piece), key=lambda piece: piece.real_count)
-    # roots next to the meeting: r where two more are real, p where these two are a pair
+    # roots next to the meeting: r on the side where the two are real, p on the side where they are a pair
     r, p = (part.roots[-1 if (part is old_piece) == forward else 0] for part in (many_reals, few_reals))
     i = int(np.diff(r[: many_reals.real_count].real).argmin())  # real roots i and i + 1 form the pair j
     j = few_reals.real_count + int(p[few_reals.real_count :].imag.argmin())

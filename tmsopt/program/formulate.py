@@ -53,14 +53,12 @@ from tmsopt.records import Table
 from tmsopt.roots import Pattern
 
 LiftFunction = Callable[["Builder"], LiftedQuantity]
-"""Adds the variables and rows of a root quantity: its worst value over all cases, without those of the radius."""
+"""Adds the variables and rows of a root quantity: its worst value over all cases except those of a radius."""
 
 LIMIT = ".limit"
 """The limit of a constraint `x` is the number `x.limit`."""
 
-_LEEWAY = (
-    1e-9  # the constant in max(x, constant) is lowered by this, so that it is not active with a limit of the same value
-)
+_LEEWAY = 1e-9  # max(x, constant): the constant is lowered by this, because a limit may have the same value
 
 
 def formulate(
@@ -77,7 +75,7 @@ def formulate(
         elastic: keep every constraint as a row, so that it can be relaxed.
         damping_ratio: fix the damping ratio at 1 (all roots real and negative) or −1 (a positive real root). The
             recheck of the solution tests whether it has this damping ratio.
-        lead: +1 or −1, the sign that a0 keeps while it may become 0; 0 if the NLP excludes a0 = 0.
+        lead: +1 allows a0 >= 0, −1 allows a0 <= 0, 0 excludes a0 = 0.
     """
     matched = formulate_matching(problem, cases=cases) if problem.pattern else None
     nlp = matched or formulate_by_factors(problem, cases, elastic, damping_ratio, lead)
@@ -148,7 +146,7 @@ class Builder:
 
     Args:
         lift_functions: root quantity → the function that adds it to the NLP; by default as factors.
-        lead: +1 or −1, the sign that a0 keeps while it may become 0; 0 if the NLP excludes a0 = 0.
+        lead: +1 allows a0 >= 0, −1 allows a0 <= 0, 0 excludes a0 = 0.
     """
 
     def __init__(
@@ -167,14 +165,14 @@ class Builder:
         self.bounds: list[tuple[float, float]] = []
         self.rows: list[tuple[str, Any, float, float]] = []
         self.lifts: list[AddedVariable] = []
-        self.contacts: dict[str, tuple[Contact, ...]] = {}  # how roots can lie at the bound that a quantity is
+        self.contacts: dict[str, tuple[Contact, ...]] = {}  # quantity → ways in which roots can attain its value
         self.products: list[tuple[Factor, ...]] = []
         self.quantities: dict[str, Any] = {}
         self.fixed_quantities: set[str] = set()
         self.objective: Any = 0
         self.design = {name: self.add_parameter(name, *ends) for name, ends in problem.free.items()}
         nominal = problem.ordered({**self.design, **{n: symbol(n) for n in problem.fixed if n in self.numbers}})
-        # A case with a direction belongs to a limit on the robustness radius. If it has an edge, it reaches that edge.
+        # Cases with a direction limit the robustness radius: their displacements end at their edge, if they have one.
         radius_cases = [k for k, case in enumerate(self.cases, start=1) if case.direction]
         radius = self.add_variable(RADIUS, 0.0) if radius_cases else constant(0)
         edges = {k: case.edge for k, case in enumerate(self.cases, start=1) if case.edge}
@@ -273,7 +271,7 @@ class Builder:
                 self.add_row("objective", value - self.objective, -np.inf, 0.0)
 
     def evaluate_cases(self, expression: Expression, limit: Any = None) -> list[Any]:
-        """Values of the expression, minus a limit if given: of each covered case, or the nominal one if all agree."""
+        """Values of the expression minus a limit, one for each covered case, or only one if no case changes it."""
         cases = self.covered_cases if depends_on_case(self.problem, expression, self.cases) else [0]
         each = [self.values[k] for k in cases]
         return [expression(v) if limit is None else expression.difference(v, limit) for v in each]
@@ -364,7 +362,7 @@ _LIFT_FUNCTIONS: Mapping[str, LiftFunction] = {
 
 
 def _numeric_inputs(problem: Posed, values: Values) -> dict[str, float]:
-    """Name in the formulas → value of each free parameter of a design and of each fixed parameter."""
+    """Values of the free and the fixed parameters by their names in formulas."""
     free = {variable_name(k): x for k, x in enumerate(variables_of(problem, values))}
     return {**free, **{n: float(values[n]) for n in problem.fixed}}
 

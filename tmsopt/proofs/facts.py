@@ -90,9 +90,8 @@ def stability_verdict(factorisation: Factorisation, of_H: bool = False) -> Verdi
             True, f"all {subjects} are {stable_side} (signs of Routh–Hurwitz expressions, by interval arithmetic)"
         )
     if factorisation.stable is None:
-        return Verdict(
-            None, "a Routh–Hurwitz expression is 0 within its error; a larger --digits decides, unless it is exactly 0"
-        )
+        text = "a Routh–Hurwitz expression is 0 within its error; a larger --digits decides, unless it is exactly 0"
+        return Verdict(None, text)
     roots = factorisation.roots or ()
     axis_roots = [z for z in roots if z.re == 0]
     if not axis_roots or any(z.re > 0 for z in roots):

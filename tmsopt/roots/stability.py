@@ -93,7 +93,8 @@ def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
 
     Args:
         exact: use exact arithmetic where rounding errors could change a sign (about 0.1 ms a polynomial). The given
-            doubles count as exact numbers. Without effect up to degree 4: there the conditions in doubles decide.
+            doubles count as exact numbers. It has no effect up to degree 4, where the Liénard–Chipart
+            conditions in doubles decide.
 
     Raises:
         ValueError: for fewer than two coefficients.
@@ -139,9 +140,9 @@ def _is_stable_by_routh(c: Array, exact: bool) -> NDArray[np.bool_]:
 def discriminant(coefficients: Coefficients) -> Any:
     """Discriminant of a polynomial of degree 2 or more, zero if and only if two roots coincide; numbers of any kind.
 
-    For a quartic it is (4 I³ − J²)/27 with the invariants I and J, and does not change sign at the sets 2EP2
-    and CEP2, where it has a squared factor. From degree 5 it is the Bézout determinant of p′ and n p − s p′, divided by
-    n^(n−2). The determinant takes n 2ⁿ products and no division.
+    For a quartic it is (4 I³ − J²)/27 with the invariants I and J. Near a CEP2 it does not change sign; near a 2EP2 it
+    has both signs. From degree 5 it is the Bézout determinant of p′ and n p − s p′, divided by n^(n−2). The determinant
+    takes n 2ⁿ products and no division.
 
     Raises:
         ValueError: for degree 0 or 1.
@@ -169,11 +170,11 @@ def discriminant(coefficients: Coefficients) -> Any:
 def _bezout_discriminant(c: Coefficients) -> Any:
     n = len(c) - 1
     derivative = [(n - k) * c[k] for k in range(n)][::-1]  # p′, ascending, as in Bézout's matrix
-    remainder = [(k + 1) * c[k + 1] for k in range(n)][::-1]
+    reduced = [(k + 1) * c[k + 1] for k in range(n)][::-1]
 
     def entry(i: int, j: int) -> list[Any]:
         terms = [
-            derivative[i + j + 1 - k] * remainder[k] - derivative[k] * remainder[i + j + 1 - k]
+            derivative[i + j + 1 - k] * reduced[k] - derivative[k] * reduced[i + j + 1 - k]
             for k in range(max(0, i + j + 2 - n), min(i, j) + 1)
         ]
         return [sum(terms[1:], terms[0])]
