@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -118,8 +118,13 @@ class Column(Sequence[float]):
         self._values = np.array(values, dtype=np.float64)
         self._values.flags.writeable = False
 
-    def __getitem__(self, index: Any) -> Any:
-        """A float, or a Column for a slice."""
+    @overload
+    def __getitem__(self, index: int) -> float: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> "Column": ...
+
+    def __getitem__(self, index: int | slice) -> "float | Column":
         return Column(self._values[index]) if isinstance(index, slice) else float(self._values[index])
 
     def __len__(self) -> int:

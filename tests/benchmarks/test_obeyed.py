@@ -10,7 +10,7 @@ from benchmarks.suites.statements.remedies import infeasible_files
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param("robots 10", marks=pytest.mark.xfail(reason="the advice leads to a design that has no best one")),
+        "robots 10",
         "bicycles 4",
     ],
 )
