@@ -1,10 +1,10 @@
 """Commands about designs: `tmsopt solve`, `explore`, `compare`, `prove`, `diagnose`, `speeds`, `simulate`, `trace`."""
 
 import math
-import webbrowser
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -180,7 +180,7 @@ class ExploreCommand(WithSearch, OnFile):
         if page.solution is not None and page.solution.status != "optimal":
             status = page.solution.status.replace("_", " ")
             click.echo(f"{status}: the page opens with the nearest that was found", err=True)
-        if self.open and not webbrowser.open(path.resolve().as_uri()):
+        if self.open and not import_module("webbrowser").open(path.resolve().as_uri()):
             click.echo(f"no browser was found here; open {path} in one", err=True)
 
 

@@ -16,7 +16,6 @@ from tmsopt.problem import Band, Given, Posed, Problem, Solution, Unit, load, po
 from tmsopt.problem.advice.names import vocabulary
 from tmsopt.problem.toml import read_page
 from tmsopt.records import Table
-from tmsopt.studies import load_study
 
 Typed = Mapping[str, Any]
 """The tables of a file as typed; empty if there is no file."""
@@ -63,6 +62,8 @@ def _read(path: str | PathLike[str]) -> tuple[Problem, Typed]:
     inner = data.get("problem")
     if isinstance(inner, str):
         return _read(Path(path).parent / inner)
+    from tmsopt.studies import load_study  # not needed for a solve, which describes its parameters
+
     return load_study(path).problem, inner if isinstance(inner, dict) else {}
 
 
