@@ -100,7 +100,7 @@ def _describe_cost(row: RoundedDesign, explanation: Explanation) -> str:
     if _is_near(row, explanation) or explanation.abscissa >= -_ZERO:
         cost = _describe_benefit(row, explanation)
     else:
-        cost = f"keeps {100 * row.realised / explanation.abscissa:.2g} % of the decay rate"
+        cost = f"loses {100 * row.loss / -explanation.abscissa:.2g} % of the decay rate"
     return f"{cost} and violates the limit {' and '.join(map(repr, row.violations))}" if row.violations else cost
 
 
