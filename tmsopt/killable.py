@@ -116,5 +116,5 @@ def _listen(calls: IO[bytes], queue: SimpleQueue[Any]) -> None:
     while True:
         try:
             queue.put(pickle.load(calls))
-        except (EOFError, OSError):
+        except (EOFError, OSError, pickle.UnpicklingError):  # the last: the parent was killed while it wrote
             os._exit(0)
