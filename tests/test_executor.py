@@ -1,6 +1,7 @@
 """Executors: the same results wherever they are computed, and what is left when workers are killed."""
 
 import os
+import pickle
 import random
 import signal
 import subprocess
@@ -17,7 +18,7 @@ from helpers.works import Fake, Unloadable
 
 from tmsopt.errors import InputError
 from tmsopt.executor import Crash, EngineError, cluster, cores, here, processes
-from tmsopt.killable import Killable, ProcessEnded
+from tmsopt.killable import Killable, ProcessEnded, start as start_process
 
 
 def local_cluster(workers, **options):
@@ -199,6 +200,17 @@ def test_a_killable_process_answers_raises_and_ends():
         process.end()
     assert isinstance(answer.exception(timeout=60), ProcessEnded)
     assert isinstance(process.call(abs, 1).exception(timeout=60), ProcessEnded)
+
+
+@pytest.mark.parametrize("end", [None, -3], ids=["between calls", "while it writes a call"])
+def test_a_process_ends_if_its_parent_dies(end):
+    with start_process() as process:
+        process.stdin.write(pickle.dumps(bool) + (pickle.dumps((abs, (1,)))[:end] if end else b""))
+        process.stdin.close()
+        try:
+            process.wait(timeout=30)
+        finally:
+            process.kill()
 
 
 # Clusters that are refused

@@ -113,8 +113,7 @@ def serve() -> None:
 
 
 def _listen(calls: IO[bytes], queue: SimpleQueue[Any]) -> None:
-    while True:
-        try:
+    with suppress(Exception):  # the parent has ended, perhaps while it wrote, or a call cannot be loaded here
+        while True:
             queue.put(pickle.load(calls))
-        except (EOFError, OSError, pickle.UnpicklingError):  # the last: the parent was killed while it wrote
-            os._exit(0)
+    os._exit(1)
