@@ -373,6 +373,9 @@ def test_what_a_change_does_is_said_in_the_words_of_a_model():
     assert describe_robustness(robustness(oscillator(1.0, 0.1, 2.0), weights={"c": 1.0})) == (
         "a change of 0.1 times the weights makes it unstable (flutter)"
     )
+    assert describe_robustness(robustness(oscillator(1.0, 0.1, 2.0), weights={"k": 1.0, "c": 1.0})) == (
+        "a change of 0.1 times the weights, mostly in c, makes it unstable (flutter)"
+    )
     assert describe_robustness(robustness(oscillator(1.0, 0.1, 2.0), weights={"k": 1.0})).endswith(
         "makes it unstable (divergence)"
     )

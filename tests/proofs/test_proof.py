@@ -195,6 +195,13 @@ def test_the_critical_speed():
     assert proof.abscissa == Number("0", "0")
 
 
+def test_a_zero_is_printed_as_0():
+    """Of the PT-symmetric trimer both detunings are 0, and gain and loss √2."""
+    lines = [line.split() for line in prove("problems/pt_trimer.toml").report().splitlines()]
+    shown = {words[0]: words[1] for words in lines if words and words[0] in ("d1", "d3", "gain")}
+    assert (shown["d1"], shown["d3"], shown["gain"][:12]) == ("0", "0", f"{math.sqrt(2):.10f}")
+
+
 def test_a_root_at_0():
     """a4 = −ζ_B T − μ (χ_H − 1) vanishes at tan λ_s = μ (χ_H − 1)/|ζ_B| = 1/20."""
     held = {"chi_H": 1.2, "chi_B": 1.3, "Fr": 1.3}
