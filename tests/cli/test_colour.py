@@ -8,6 +8,7 @@ import pytest
 from helpers.terminal import ROOT, environment, on_a_terminal
 
 EP4 = str(ROOT / "problems" / "ep4.toml")
+STUDY = str(ROOT / "problems" / "study_heights.toml")
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="terminals of POSIX")
 
 
@@ -57,9 +58,11 @@ def test_another_word_for_colours_is_refused(run):
 
 
 @pytest.mark.parametrize("columns", [80, 60])
-def test_a_report_fits_the_terminal(columns, tmp_path):
-    seen = on_a_terminal(["speeds", EP4, "--color=never"], tmp_path, columns=columns, whole=True)
-    assert max(map(len, seen.text.split("\033[K")[-1].splitlines())) <= columns
+@pytest.mark.parametrize("command", [["speeds", EP4], ["study", STUDY]], ids=lambda words: words[0])
+def test_a_report_fits_the_terminal(command, columns, tmp_path):
+    seen = on_a_terminal([*command, "--color=never"], tmp_path, columns=columns, whole=True)
+    lines = seen.text.split("\033[K")[-1].replace(str(tmp_path), "").splitlines()  # a path is one word
+    assert max(map(len, lines)) <= columns
 
 
 def test_a_narrow_encoding_gets_its_own_letters():

@@ -111,12 +111,12 @@ def make_document(result: Any, level: Any = "brief", **options: Any) -> Any:
 
 
 def lay_out(document: Any) -> str:
-    """The text of a document, with the width, colours and letters of this stdout."""
-    if isinstance(document, str):
-        return document
-    from tmsopt.documents import to_text
+    """The text of a document, or a text of one line, with the width, colours and letters of this stdout."""
+    from tmsopt.documents import to_text, wrap
 
     width = min(max(count_columns(sys.stdout), _MIN_COLUMNS), _MAX_COLUMNS) if sys.stdout.isatty() else _PIPE_COLUMNS
+    if isinstance(document, str):
+        return document if "\n" in document else "\n".join(wrap(document, width))
     encoded = _REPORT_LETTERS.encode(sys.stdout.encoding or "utf-8", "ignore")
     return to_text(document, width, is_coloured(), len(encoded) < len(_REPORT_LETTERS))
 

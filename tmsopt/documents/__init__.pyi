@@ -14,4 +14,4 @@ from .results import (
 )
 from .robustness import describe_robustness as describe_robustness
 from .studies import describe_row as describe_row
-from .text import to_headline as to_headline, to_text as to_text
+from .text import to_headline as to_headline, to_text as to_text, wrap as wrap
