@@ -61,7 +61,7 @@ def write_comparison(comparison: Comparison, _level: Level) -> Parts:
 
 
 def _write_laws(comparison: Comparison) -> Parts:
-    rows: list[Row] = [("law", "of", "numeric", "law says", "relative", "verdict")]
+    rows: list[Row] = [("law", "quantity", "numeric", "law says", "relative", "verdict")]
     inapplicable_laws: dict[str, list[str]] = {}
     for row in comparison.laws:
         if row.applies:
@@ -69,7 +69,7 @@ def _write_laws(comparison: Comparison) -> Parts:
             rows.append((row.label, row.subject, Cell(row.numeric), Cell(row.law), f"{row.relative:.1e}", verdict))
         else:
             inapplicable_laws.setdefault(row.reason, []).append(f"{row.label} ({row.subject})")
-    yield TableBlock(rows, "Laws and numbers", priorities=(9, 5, 7, 7, 6, 8))
+    yield TableBlock(rows, "Laws and numbers", priorities=(9, 6, 7, 7, 5, 8))
     for reason, labels in inapplicable_laws.items():
         yield Sentence(f"{', '.join(labels)}; {reason}", "not applicable to this design")
 
