@@ -338,6 +338,13 @@ def test_a_solution_says_what_its_multiple_root_is():
     assert "ε^(1/4)" in text
 
 
+def test_a_root_that_is_a_rounded_zero_has_its_ranks():
+    """The stored trimer has all eigenfrequencies at 1e-14; H has rank 2 there, in closed form."""
+    (diagnosis,) = tmsopt.diagnose(tmsopt.solve("problems/pt_trimer.toml"))
+    assert diagnosis.jordan is not None
+    assert (diagnosis.algebraic, diagnosis.geometric, diagnosis.partial) == (3, 1, (3,))
+
+
 def test_all_designs_take_no_diagnosis():
     ended = CliRunner().invoke(main, ["solve", "problems/coupled_pair.toml", "--all", "--full"])
     assert ended.exit_code == 2

@@ -37,7 +37,7 @@ class Jordan:
 
 
 def is_regular(matrices: Sequence[Matrix], s: Any, threshold: float) -> bool:
-    """Whether det L is not identically 0, judged at three arbitrary points near s.
+    """Whether det L is not identically 0, judged at three arbitrary points at distances of the size of the roots.
 
     Example:
         >>> import flint
@@ -47,7 +47,9 @@ def is_regular(matrices: Sequence[Matrix], s: Any, threshold: float) -> bool:
 
     More: docs/explanation/exceptional_points.md
     """
-    unit = abs(s) if abs(s) > 0 else flint.arb(1)
+    leading, *others = (float(np.linalg.norm(_as_complex(P))) for P in matrices)
+    sizes = [(size / leading) ** (1 / k) for k, size in enumerate(others, start=1) if leading > 0]
+    unit = max([float(abs(s).mid()), *sizes]) or 1.0  # s may be a rounded 0
     return any(jordan(matrices, s + unit * flint.acb(a, b), 1, threshold).zero > threshold for a, b in _OFFSETS)
 
 
