@@ -168,7 +168,7 @@ def test_a_bare_polynomial_has_one_chain_and_may_move_linearly():
     law = found.responses[0].laws[0]
     assert str(law.branches.exponent) == "1"
     assert sorted(c.real for c in law.branches.constants) == pytest.approx([-1, 1], rel=1e-12)
-    assert "without matrices" in str(found)
+    assert "no matrices" in str(found)
 
 
 def test_flutter_of_the_undamped_ziegler_pendulum():
@@ -231,7 +231,7 @@ def test_what_has_no_power_series_is_not_resolved():
     found = diagnosis_of(from_coefficients([1, 2, "1 - sqrt(x) - y"]), x=0.0, y=0.0)
     assert response(found, "x") == Response("x", False, (), 0, 2)
     assert str(response(found, "y").laws[0].branches.exponent) == "1/2"
-    assert "not resolved for x" in str(found)
+    assert "not resolved for x" in " ".join(str(found).split())
 
 
 def test_orders_beyond_ten_count():

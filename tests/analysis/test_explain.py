@@ -262,7 +262,7 @@ def test_nothing_to_warn_of_at_a_free_optimum(ep4):
 
 def test_an_arbitrary_bound_is_warned_of_and_a_constraint_is_not(realistic):
     (warned,) = realistic[1].warnings  # and nothing of mu without effect, for chi_H is not 1
-    assert "Fr.max = 2.5, mu.max = 0.2, lambda_s.max = 30 deg; widen" in warned
+    assert "Fr.max = 2.5, mu.max = 0.2, lambda_s.max = 30 deg; if a range is a guess" in warned
 
 
 def test_a_physical_end_is_no_arbitrary_bound():
@@ -387,7 +387,7 @@ def test_rounding_in_one_line_says_how_many_digits_are_enough():
     assert share == int(100 * kept[digits])
     assert told.endswith(f"keeps {share} % of the decay rate; {tmsopt.explain(design).worst} needs the most digits")
     assert told.startswith(
-        f"to 3 digits the design loses {round(100 * (1 - kept[3]))} % of the decay rate and violates the limit 'offset' and "
+        f"with 3 digits the design loses {round(100 * (1 - kept[3]))} % of the decay rate and violates the limit 'offset' and "
     )  # a workshop's
 
 
@@ -400,7 +400,7 @@ def test_digits_that_are_enough_by_chance_are_not_told():
         moved[digits] = np.roots(design.problem.model.coefficients({**design.parameters, **short})).real.max()
     assert moved[2] < 1e-7 < moved[6] < moved[4]
     assert describe_rounding(tmsopt.explain(design, resolve=False)) == (
-        f"to 6 digits the design shifts its rightmost root by {moved[6]:.2g}"
+        f"with 6 digits the design shifts its rightmost root by {moved[6]:.2g}"
     )
 
 
@@ -409,5 +409,5 @@ def test_rounding_that_makes_a_design_unstable_is_said_so():
     model = from_coefficients([1, "x - 1.23456", 1])
     problem = tmsopt.Problem(model, free={"x": (1.0, 1.23466)}, minimize="abscissa")
     told = describe_rounding(tmsopt.explain(tmsopt.solve(problem), resolve=False))
-    assert told.startswith("to 3 digits the design is unstable (x alone: 1.23); ")
-    assert told.endswith("to 6 digits it keeps 100 % of the decay rate")
+    assert told.startswith("with 3 digits the design is unstable (x alone: 1.23); ")
+    assert told.endswith("with 6 digits it keeps 100 % of the decay rate")

@@ -127,7 +127,7 @@ def test_ends_are_EP4_and_the_decay_that_is_asked_for(front):
 
 def test_kinks_are_where_the_theory_has_them(front):
     names = [(k.name, k.index) for k in front.kinks]
-    assert [n for n, _ in names] == ["EP3 -> pair+real", "lambda_s.min begins to bind"]
+    assert [n for n, _ in names] == ["EP3 -> pair+real", "lambda_s.min becomes active"]
     width = 2e-4 * (front.nadir[0] - front.ideal[0])  # what kinks are located to
     for (name, index), sigma in zip(names, (ep3_kink(), tilt_kink()), strict=True):
         assert front.points[index].objectives[0] == pytest.approx(-sigma, abs=width)
@@ -152,7 +152,7 @@ def test_the_order_of_objectives_does_not_matter(front):
         assert p.objectives[0] == pytest.approx(least_Fr(-p.objectives[1]), abs=ROUNDING)
     ends = [other.points[k].objectives[::-1] for k in (-1, 0)]
     assert ends == [pytest.approx(front.points[k].objectives, abs=ROUNDING) for k in (0, -1)]
-    assert [k.name for k in other.kinks] == ["lambda_s.min ceases to bind", "pair+real -> EP3"]
+    assert [k.name for k in other.kinks] == ["lambda_s.min becomes inactive", "pair+real -> EP3"]
 
 
 WAVE = {"fixed": {**BASE, "lambda_s": 0.4, "Fr": 0.01}, "free": {"chi_B": (0.0, 4.0)}, "constraints": {}}

@@ -108,7 +108,8 @@ def _describe_required_speed(solution: Solution, need: RequiredValue) -> str:
         low, high = need.looked
         return f"{subject} {exists} {at}; none was found for {name} from {unit.number(low)} to {unit.show(high)} either"
     extreme, value = "highest" if need.most else "lowest", unit.show(need.shown)
-    return f"{subject} {exists} {at}; the {extreme} {name} found at which all other limits hold is {value}"
+    design = "a stable design that satisfies all other limits" if is_unstable else "a design that satisfies all limits"
+    return f"{subject} {exists} {at}; the {extreme} {name} found for {design} is {value}"
 
 
 def _is_unstable(solution: Solution) -> bool:

@@ -28,7 +28,7 @@ def structure_line(problem: Posed, structure: str, abscissa: float, multiple_roo
     if crossing := next((m for m in multiple if not m.exceptional), None):
         return f"{words}: {describe_crossing(crossing)}"
     if multiple_roots and problem.model.pencil is None and "EP" in f"{problem.locate or ''}{structure}":
-        return f"{words}; coefficients cannot tell whether it is defective"
+        return f"{words}; coefficients cannot tell whether the root is defective"
     return words
 
 
@@ -53,16 +53,14 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
         family = {1: "a curve", 2: "a surface"}.get(count, f"a {count}-parameter family")
         trace = ", which tmsopt trace follows" if count == 1 else ""
         family_text = f"; it belongs to {family} of such designs{trace}" if count > 0 else ""
-        return f"tmsopt prove FILE proves or refutes that this design exists{family_text}"
+        return f"tmsopt prove FILE tries to prove that this point exists exactly{family_text}"
     if bound.proven:
-        return f"{no_design(problem)} {describe_better(solution, text)} ({bound.method})"
+        return f"{no_design(problem)} {describe_better(solution, text)} (method {bound.method})"
     if math.isfinite(bound.value):
         unit = common_unit(problem, text)
         value, gap = unit.show(bound.value, 6), unit.show(bound.gap, 2)
-        statement = (
-            f"{no_design(problem)} is {_bound_side(problem)} {value} ({bound.method}), gap {gap}{_search_effort(bound)}"
-        )
-        return _append_advice(statement, not_covered or _advise_certify(bound, "--certify tries to close it"))
+        statement = f"{_state_bound(problem, text, value, bound)}, gap {gap}{_search_effort(bound)}"
+        return _append_advice(statement, not_covered or _advise_certify(bound, "--certify tries to reduce the gap"))
     advice = not_covered or _advise_certify(bound, "--certify looks for a proof or a better design")
     return _append_advice(f"not proved to be the best{_search_effort(bound)}", advice)
 
@@ -78,8 +76,8 @@ def bound_lines(solution: Solution) -> list[str]:
         return [f"proved: no design satisfies all constraints ({how})"] if bound.proven else []
     if not math.isfinite(bound.value):
         return [f"bound: none found in time ({search})"] if bound.seconds else []
-    which = f"{no_design(problem)} is {_bound_side(problem)} {Unit().number(bound.value, _DIGITS)}"
-    lines = [f"bound: {which} ({bound.method}); gap {bound.gap:.1e}"]
+    text, value = (problem.minimize or problem.maximize or "").strip(), Unit().number(bound.value, _DIGITS)
+    lines = [f"bound: {_state_bound(problem, text, value, bound)}; gap {bound.gap:.1e}"]
     if bound.method == bound.solver.lower():
         lines.append(f"how: {search}; {kind}")
     elif bound.seconds:
@@ -87,8 +85,9 @@ def bound_lines(solution: Solution) -> list[str]:
     return lines
 
 
-def _bound_side(problem: Posed) -> str:
-    return "above" if problem.sense == "maximize" else "below"
+def _state_bound(problem: Posed, objective: str, value: str, bound: Bound) -> str:
+    sign = ">" if problem.sense == "maximize" else "<"
+    return f"{no_design(problem)} has {objective} {sign} {value} (method {bound.method})"
 
 
 def _append_advice(text: str, advice: str) -> str:

@@ -71,7 +71,8 @@ def _describe_quality(solution: Solution) -> str:
         return f"a design with {problem.locate}, as asked{surplus}"
     if bound.proven:
         return f"{no_design(problem)} {describe_better(solution, goal)} (proved)"
-    sureness = ", ".join([*solution.starts.sureness, "not proved"])
+    origin, doubt = solution.starts.sureness[:1], solution.starts.sureness[1:]
+    sureness = ", ".join([*origin, "not proved", *doubt])
     if math.isfinite(bound.value):
         side = "above" if problem.sense == "maximize" else "below"
         quantity = "an abscissa" if goal == "abscissa" else f"a value of {goal}"
@@ -95,7 +96,7 @@ def _warn_of_active_bounds(solution: Solution) -> Iterator[str]:
     active = [bound for bound in bounds if bound in solution.active and bound not in problem.constraints]
     if arbitrary := [bound for bound in active if not is_physical(problem, bound)]:
         bounds_text = ", ".join(f"{bound} = {_describe_bound(problem, bound)}" for bound in arbitrary)
-        advice = "widen a guessed range, and state a real limit as a constraint"
+        advice = "if a range is a guess, widen it; if it is a real limit, write it as a constraint"
         yield f"ends of ranges limit the design: {bounds_text}; {advice}"
 
 

@@ -72,7 +72,7 @@ def _describe_branch(branch: Branch, trace: Trace) -> str:
     states = f"{'bounds stability' if remaining_factor else 'stable'} on {share}"
     if any(not c.equality for c in trace.problem.posed.conditions.values()):
         states += f", constraints hold on {100 * float(np.mean(branch.satisfied)):.0f} %"
-    form = "closed" if branch.closed else "open"
+    form = "closed" if branch.closed else "not closed"
     doubt = "" if branch.residual <= _MAX_MISMATCH else " (too large)"
     kinds = in_words_of(trace.problem.model, " and ".join(dict.fromkeys(kinds_along(branch))))
     return f"{kinds}, {len(branch)} points, {form}, {states}, coefficient error {branch.residual:.0e}{doubt}"
@@ -122,7 +122,7 @@ def _tabulate_points(trace: Trace) -> Parts:
 
 def write_branch(branch: Branch, _level: Level) -> Parts:
     """Write one branch with its events, in the free parameters."""
-    form = "closed" if branch.closed else "open"
+    form = "closed" if branch.closed else "not closed"
     yield branch.pattern, count_things(branch, "point"), count_things(branch.events, "event"), form
     text = f"{branch.pattern}: {len(branch)} points, {form}, coefficient error {branch.residual:.0e}"
     yield Sentence(text, tone="answer")

@@ -35,6 +35,13 @@ def convert_to_si(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
     return solution.parameters if needs_no_conversion else to_si(solution.dimensionless, w, m_B, g)
 
 
+def head_other_form(solution: Solution, si: Numbers) -> str:
+    """Heading of the numbers that are converted: to numbers without units, or to SI with this scale."""
+    if solution.problem.posed.parameter_set.rate is not None:
+        return "without units"
+    return f"in SI if w = {si['w']:g} m, m_B = {si['m_B']:g} kg" if {"w", "m_B"} <= si.keys() else "in SI"
+
+
 def list_parameters(solution: Solution, si: Numbers, brief: bool = False) -> Iterator[tuple[str, Cell, str, str, str]]:
     """List name, number, role, value in the other set, and meaning of each parameter.
 
@@ -65,7 +72,7 @@ def list_parameters(solution: Solution, si: Numbers, brief: bool = False) -> Ite
 def tabulate_parameters(solution: Solution, si: Numbers) -> TableBlock:
     """Tabulate every parameter with its role, range, value in the other set, and meaning."""
     ranges = {w.name: w.given for parameter_set in describe(solution).sets for w in parameter_set.parameters}
-    other_form = "without units" if solution.problem.posed.parameter_set.rate is not None else "in SI"
+    other_form = head_other_form(solution, si)
     rows: list[Row] = [("parameter", "value", "unit", "free or fixed", "range", other_form, "meaning")]
     for name, cell, role, counterpart, meaning in list_parameters(solution, si):
         rows.append((name, cell, cell.unit.text, role, ranges[name] if role == "free" else "", counterpart, meaning))
@@ -252,7 +259,7 @@ def describe_stored(solution: Solution) -> Iterator[str]:
     exact_text = show_at(problem, "abscissa", case_parameters, exact_abscissa, ALL_DIGITS)
     yield f"abscissa {exact_text}; with the parameters rounded to doubles {stored_text}"
     label, text = describe_roots(solution, ALL_DIGITS)
-    yield f"{label} with all digits: {text}"
+    yield f"{label} to {ALL_DIGITS} digits: {text}"
 
 
 def _time_units(solution: Solution) -> tuple[float, Unit, Unit]:

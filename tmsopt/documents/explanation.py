@@ -22,6 +22,7 @@ from tmsopt.documents.blocks import (
     count_things,
 )
 from tmsopt.documents.design_rows import format_pair, format_root
+from tmsopt.documents.tables import without_empty_columns
 
 _MAX_COST, _ZERO = 0.05, 1e-9
 """Largest relative loss of decay and objective that rounding may cause; a smaller absolute loss than `_ZERO` is 0."""
@@ -67,14 +68,14 @@ def describe_rounding(explanation: Explanation) -> str:
     rounded_design = next((row for row in rows if row.digits == ALONE), None)
     parts, unstable = [], False
     if stable and rounded_design and rounded_design.realised < 0 and (fewest is None or fewest.digits > ALONE):
-        parts.append(f"to {ALONE} digits the design {_describe_cost(rounded_design, explanation)}")
+        parts.append(f"with {ALONE} digits the design {_describe_cost(rounded_design, explanation)}")
     if stable and rounded_design and not rounded_design.realised < 0:
         alone, unstable = explanation.rounding.get(explanation.worst), True
         worst = f" ({explanation.worst} alone: {alone.written[explanation.worst]})" if alone else ""
-        parts.append(f"to {ALONE} digits the design is unstable{worst}")
+        parts.append(f"with {ALONE} digits the design is unstable{worst}")
     last = fewest or rows[-1]
     effect = (_describe_benefit if fewest else _describe_cost)(last, explanation)
-    parts.append(f"to {last.digits} digits {'it' if parts else 'the design'} {effect}")
+    parts.append(f"with {last.digits} digits {'it' if parts else 'the design'} {effect}")
     needs = f"; {explanation.worst} needs the most digits" if explanation.worst and not unstable else ""
     return f"{'; '.join(parts)}{needs}"
 
@@ -135,16 +136,10 @@ def write_optimality(optimality: Optimality, _level: Level = "full") -> Parts:
         of_H = optimality.roots[0].eigenfrequency is not None
         root = "an eigenfrequency of the largest Im ω" if of_H else "a root on the rightmost line"
         balance = f"the optimality conditions hold within {optimality.residual:.1g}"
-        yield f"increase of the objective if {root} moves by one unit ({balance}):"
-        head = (
-            "root",
-            f"if it moves {'down' if of_H else 'to the left'}",
-            "share of the total",
-            "if a multiple root splits",
-        )
+        yield f"increase of the objective if {root} is forced to move by one unit ({balance}):"
+        head = ("root", "down" if of_H else "to the left", "share of the total", "if a multiple root splits")
         rows = [head, *map(_list_root, optimality.roots)]
-        is_multiple = any(root.multiplicity > 1 for root in optimality.roots)
-        yield TableBlock(rows if is_multiple else [row[:-1] for row in rows], "Multipliers")
+        yield TableBlock(without_empty_columns(rows), "Multipliers")
 
 
 def _list_root(root: RightmostRoot) -> tuple[str, ...]:
@@ -172,12 +167,15 @@ def write_diagnosis(diagnosis: Diagnosis, level: Level = "full") -> Parts:
 def _describe_root(diagnosis: Diagnosis) -> str:
     vectors = count_things(diagnosis.geometric, "independent eigenvector")
     if diagnosis.jordan is None:
-        reason = "without matrices, one chain of eigenvectors is assumed, as for a companion matrix"
+        reason = "no matrices decide it: one Jordan chain is assumed, as for a companion matrix"
     else:
         jordan = diagnosis.jordan
-        zero = f"{jordan.zero:.1g}" if jordan.zero > _SMALLEST_SHOWN else f"below {_SMALLEST_SHOWN:g}"
+        zero = f"{jordan.zero:.1g}" if jordan.zero > _SMALLEST_SHOWN else f"less than {_SMALLEST_SHOWN:g}"
+        is_zero = f"is {zero} and counts"
+        if diagnosis.geometric > 1:
+            is_zero = f"{diagnosis.geometric} are at most {zero} and count"
         reason = vectors + (f" instead of {diagnosis.algebraic}" if diagnosis.geometric < diagnosis.algebraic else "")
-        reason += f"; singular values of the matrix, divided by the largest: {zero} counts as 0"
+        reason += f"; singular values of the matrix, divided by the largest: the smallest {is_zero} as 0"
         reason += f", the next is {jordan.nonzero:.2g}" if jordan.nonzero < math.inf else ""
     lengths = ", ".join(map(str, diagnosis.partial))
     plural = "s" if len(diagnosis.partial) > 1 else ""
@@ -202,7 +200,7 @@ def _describe_splitting(diagnosis: Diagnosis, full: bool) -> str:
         change = "relative change" if first.relative else "change"
         first_law = f"a {change} ε of {first.parameter} moves it by {_describe_laws(first, diagnosis)}"
         parts = [
-            f"{first_law}, within {100 * DEVIATION:.0f} % {_describe_range(first.laws[0])} (sampled)",
+            f"{first_law}, with an error below {100 * DEVIATION:.0f} % {_describe_range(first.laws[0])} (at sampled ε)",
             *([] if full else other_laws),
         ]
     if unmoved_names:

@@ -29,7 +29,7 @@ def write_front(front: Front, level: Level) -> Parts:
     where = f", designs with {problem.locate}" if problem.locate else ""
     special = ((len(front.kinks), "kink"), (len(front.gaps), "gap"))
     counts = "".join(f"{count_things(n, word)}, " for n, word in special if n)
-    heading = f"front of least {', '.join(t.strip() for t in front.objectives)}{where}"
+    heading = f"Pareto front of {', '.join(t.strip() for t in front.objectives)}, each minimised{where}"
     effort = f"{front.solved} sub-problems; {front.seconds:.2f} s"
     yield Sentence(f"{heading}: {count_things(front, 'point')}, {counts}{effort}", tone="answer")
     if level == "page":
@@ -56,7 +56,7 @@ def list_points(front: Front, full: bool) -> list[Row]:
     texts = [t.strip() for t in front.objectives]
     free = [n for n in problem.free if n not in texts]
     objective_heads, free_heads = (head_numbers(problem, names) for names in (texts, free))
-    rows: list[Row] = [(*objective_heads, "stable", "special", *free_heads, "structure", "active limits")]
+    rows: list[Row] = [(*objective_heads, "stable", "event", *free_heads, "structure", "active limits")]
     for p in front.points:
         design = p.solution.parameters
         label = p.label if full or len(p.label) <= _MAX_LABEL else f"{p.label[: _MAX_LABEL - 1]}…"

@@ -80,7 +80,7 @@ def _describe_cause(motion: "Simulation") -> str:
 
 def _list_peaks(motion: "Simulation") -> Iterator[Sequence[str]]:
     noisy, time = bool(motion.disturbance.noise), _unit_in(motion, "t")
-    yield ("", "peak", "at", *(("in the long run",) if noisy else ("overshoot", "settled within 2 % at")))
+    yield ("", "peak", "at", *(("after a long time",) if noisy else ("overshoot", "settled within 2 % at")))
     for m in motion.measures:
         unit = _unit_in(motion, m.name)
         first = (_WORDS.get(m.name, m.name), unit.show(m.peak), time.show(m.at))
@@ -115,8 +115,7 @@ def _write_notes(motion: "Simulation") -> Iterator[str]:
     yield from map(_describe_merging, merged.values())
     if merged:
         noun = "eigenfrequencies" if motion.problem.model.double else "roots"
-        rounding_note = "which rounding errors hardly change"
-        yield f"{noun}: of the ideal design; motion: of the stored design, {rounding_note}"
+        yield f"the {noun} are those of the ideal design, the motion that of the design with rounded parameters"
     if not motion.stable and (words := _describe_axis(motion)):
         yield f"{words}; peaks are within the time shown"
     elif not motion.stable:
@@ -179,9 +178,9 @@ def write_speeds(speeds: Speeds, level: Level) -> Parts:
     unit, real = unit_of(speeds.problem.posed, speeds.parameter), speeds.problem.model.carrier is None
     stable = f"stable {_format_ranges(speeds.stable, unit)}"
     yield speeds.parameter, stable, count_things(speeds.found, "critical value")
-    end = f" < {unit.number(speeds.upper, 6)}" if math.isfinite(speeds.upper) else ""
-    unit_text = f" {unit.text}" if unit.text else ""
-    range_text = f"{unit.number(speeds.lower, 6)} < {speeds.parameter}{end}{unit_text}"
+    range_text = f"{speeds.parameter} > {unit.show(speeds.lower, 6)}"
+    if math.isfinite(speeds.upper):
+        range_text = f"{unit.number(speeds.lower, 6)} < {speeds.parameter} < {unit.show(speeds.upper, 6)}"
     yield Chapter("range", "Answer")
     yield f"{range_text}, by exact root isolation, with the parameters in double precision"
     yield Sentence(speeds.problem.model.omits, "model")
@@ -289,4 +288,4 @@ def describe_range(stable: Sequence[Stretch], solution: Solution) -> str:
     assert name is not None
     unit, ends = unit_of(solution.problem.posed, name), parameter_set[name].range
     bands = _format_bands(stable, (ends.lower, ends.upper), unit, 5)
-    return f"stable in {name}: {bands}; this design at {unit.show(solution.parameters[name])}"
+    return f"stable range of {name}: {bands}; this design at {unit.show(solution.parameters[name])}"

@@ -137,7 +137,7 @@ def _describe_method(problem: Posed, proof: Proof) -> Parts:
         constraint_text = " and the == constraints" if equations else ""
         equation = "a_k = a0 c_k, c_k the coefficients of the pattern"
         yield Sentence(f"Krawczyk's interval Newton test on the equations {equation}{constraint_text}", "method")
-        uniqueness = f"no other such design has every number within {proof.uniqueness:.2g} of these"
+        uniqueness = f"every other such design differs in some number by more than {proof.uniqueness:.2g}"
         yield f"error at most {proof.radius:.1e} before rounding to these digits; {uniqueness}"
         rounding_text = f"rounding alone can cause a difference of {proof.explained:.1e}"
         yield f"the stored design differs from the proved one by {proof.distance:.1e}; {rounding_text}"
@@ -190,8 +190,8 @@ def write_every(result: Every, _level: Level) -> Parts:
         no_design = f"no design in the box and within the limits has the pattern (proved; {effort})"
         yield Sentence(no_design if complete else "no isolated solution was found", tone="answer")
     else:
-        all_of_them = f"{count} in the box, no other exists (proved; {effort})"
-        located = all_of_them if complete else f"{count} in the box"
+        all_of_them = f"{count} within the ranges, no other exists (proved; {effort})"
+        located = all_of_them if complete else f"{count} within the ranges"
         yield Sentence(located, f"locate {solutions[0].problem.locate}", "answer")
         yield Chapter("designs", width="wide")
         yield TableBlock(_list_designs(result, complete), "Designs with the pattern")

@@ -63,7 +63,7 @@ def tabulate_boundaries(robustness: Robustness) -> TableBlock:
     ]
     places: list[Sequence[str]] = []
     for n in kinds if model.carrier is None else kinds[:1]:
-        distance = "" if n.found else "none found"
+        distance = "0" if n.found else "none found"
         moves = ["" for _ in names]
         if n.found and n.distance > 0:
             distance = _format_percent(n.distance) if robustness.relative else f"{n.distance:.4g}"
@@ -76,7 +76,7 @@ def tabulate_boundaries(robustness: Robustness) -> TableBlock:
                 )
             )
         rows.append((_name_row(n, robustness), distance, *moves))
-    rows += [("weight", "", *(units[name].show(robustness.weights[name], 6) for name in names)), *places]
+    rows += [("weight of a change", "", *(units[name].show(robustness.weights[name], 6) for name in names)), *places]
     is_transposed = len(names) > _MAX_COLUMNS
     return TableBlock(list(zip(*rows, strict=True)) if is_transposed else rows, "Nearest points of the boundaries")
 
@@ -99,14 +99,9 @@ def _name_place(n: Nearest, model: Model) -> str:
 
 
 def _name_row(n: Nearest, robustness: Robustness) -> str:
-    prefix = "at the edge of" if n.distance == 0 else "change to"
-    if n.kind != "heavy damping":
-        return f"{prefix} {_name_place(n, robustness.problem.model)}"
-    return (
-        f"{prefix} {n.kind}"
-        if n.distance == 0
-        else f"change {'out of' if robustness.heavily_damped else 'into'} {n.kind}"
-    )
+    if n.kind == "heavy damping":
+        return f"change {'out of' if robustness.heavily_damped else 'into'} {n.kind}"
+    return f"change to reach {_name_place(n, robustness.problem.model)}"
 
 
 def _format_moves(n: Nearest, relative: bool) -> list[str]:

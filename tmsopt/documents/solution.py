@@ -31,6 +31,7 @@ from tmsopt.documents.design_rows import (
     describe_roots,
     describe_speed,
     describe_stored,
+    head_other_form,
     list_cases,
     list_parameters,
     list_quantities,
@@ -40,6 +41,7 @@ from tmsopt.documents.design_rows import (
 from tmsopt.documents.explanation import describe_rounding, tabulate_rounding, write_diagnosis, write_optimality
 from tmsopt.documents.motion import describe_range
 from tmsopt.documents.robustness import describe_robustness, tabulate_boundaries
+from tmsopt.documents.tables import without_empty_columns
 from tmsopt.evaluation import abscissa_as_stored
 from tmsopt.guide import describe
 from tmsopt.models import tms
@@ -121,8 +123,9 @@ def write_solution(
         for diagnosis in analysis.diagnoses:
             yield from write_diagnosis(diagnosis)
     yield Chapter("quantities", "Derived quantities", "wide")
-    head = ("quantity", "value", "unit", "in SI", "meaning")
-    yield TableBlock((head, *list_quantities(solution, si_parameters)), "Quantities of the design")
+    head = ("quantity", "value", "unit", head_other_form(solution, si_parameters), "meaning")
+    rows = (head, *list_quantities(solution, si_parameters))
+    yield TableBlock(without_empty_columns(rows), "Quantities of the design")
     yield Chapter("search")
     yield from _write_search(solution)
 
@@ -360,9 +363,5 @@ def _suggest_more(solution: Solution, analysis: Analysis) -> Sentence:
         "chart": len(problem.free) in (2, 3),
         "trace": bool(problem.locate) and solution.freedom.count == 1,
     }
-    command_names = ", ".join(name for name, applies in commands.items() if applies)
-    return Sentence(
-        f"--full prints everything; the same file works with tmsopt {command_names}" if command_names else "--full",
-        "more",
-        "dim",
-    )
+    names = ", ".join(f"tmsopt {name}" for name, applies in commands.items() if applies)
+    return Sentence("--full prints everything" + (f"; for the same file: {names}" if names else ""), "more", "dim")

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from tmsopt.documents.blocks import Cell, Chapter, Listing, Parts, TableBlock, say_whether
+from tmsopt.documents.blocks import Cell, Chapter, Listing, Parts, Row, TableBlock, say_whether
 from tmsopt.guide import describe
 from tmsopt.problem import Posed, unit_at
 from tmsopt.records import Numbers
@@ -43,6 +43,12 @@ def list_numbers(
 ) -> list[Cell | str]:
     """List numbers of a design in the units of their headings; a missing number is an empty text."""
     return [Cell(values[n], unit_at(problem, n, design), digits) if n in values else "" for n in names]
+
+
+def without_empty_columns(rows: Sequence[Row]) -> list[Row]:
+    """Leave out the columns of a table that have a heading and nothing below it."""
+    columns = [column for column in zip(*rows, strict=True) if any(map(str, column[1:])) or len(rows) == 1]
+    return list(zip(*columns, strict=True))
 
 
 def tabulate_records(result: Any) -> Parts:

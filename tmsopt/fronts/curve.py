@@ -364,5 +364,5 @@ def _describe_gap(solver: FrontSolver, s: _Stretch) -> str:
 def list_changes(before: FrontPoint, after: FrontPoint) -> list[str]:
     """Names of the changes from one point to the next."""
     names = [f"{before.structure} -> {after.structure}"] if before.structure != after.structure else []
-    names += [f"{n} begins to bind" for n in after.limits if n not in before.limits]
-    return names + [f"{n} ceases to bind" for n in before.limits if n not in after.limits]
+    names += [f"{n} becomes active" for n in after.limits if n not in before.limits]
+    return names + [f"{n} becomes inactive" for n in before.limits if n not in after.limits]

@@ -52,7 +52,7 @@ class Kink:
     """A change along the front, in the order of its points.
 
     Attributes:
-        name: e.g. ``EP3 -> pair+real``, ``lambda_s.min begins to bind``.
+        name: e.g. ``EP3 -> pair+real``, ``lambda_s.min becomes active``.
         index: index of the last point before the change.
         width: width of the interval that holds the change, in ranges of the objectives.
     """

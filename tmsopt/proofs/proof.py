@@ -360,4 +360,4 @@ def _formula_numbers(problem: Posed) -> tuple[str, ...]:
 def _state_claim(name: str, pattern: Pattern | None) -> str:
     if pattern is None:
         return _SIMPLE_CLAIMS.get(name, f"structure {name}")
-    return f"a design with {name} exists: {pattern.meaning}"
+    return f"a design with {name} ({pattern.meaning}) exists"

@@ -262,7 +262,7 @@ def _describe_sides(problem: Posed, searched_parts: Sequence[SearchedPart], best
     best_side = next((state.side for state, o in searched_parts if o and o.parameters == best.parameters), None)
     if len(searched_parts) == 1 or best_side is None or best.status != "optimal":
         return ()
-    sentences = [f"both signs of the tilt: {best_side} is better"]
+    sentences = [f"both signs of the tilt were searched: {best_side} is better"]
     for state, outcome in searched_parts:
         if state.side == best_side:
             continue
@@ -272,7 +272,7 @@ def _describe_sides(problem: Posed, searched_parts: Sequence[SearchedPart], best
         elif problem.objective is None:
             sentences.append(f"{state.side} has a solution too")
         elif same_objective(outcome.checked.objective, best.checked.objective, objective_size(problem)):
-            return (f"both signs of the tilt: {state.side} is as good as {best_side}",)
+            return (f"both signs of the tilt were searched: {state.side} is as good as {best_side}",)
         else:
             value = unit_at(problem, problem.goal, outcome.parameters).show(outcome.checked.objective, 6)
             found = "" if outcome.status == "optimal" else " was found"

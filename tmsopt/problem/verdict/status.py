@@ -29,7 +29,8 @@ def describe_status(solution: "Solution") -> str:
     if problem.posed.objective is None or not problem.free:
         return "found" if problem.free else "as given"
     doubt = "stopped before it was proved" if solution.interrupted else "not proved"
-    evidence = ["proved"] if bound.proven else [*solution.starts.sureness, doubt]
+    sureness = solution.starts.sureness
+    evidence = ["proved"] if bound.proven else [*sureness[:1], doubt, *sureness[1:]]
     return f"optimal ({', '.join(evidence)})"
 
 
@@ -40,8 +41,8 @@ def describe_verdict(solution: "Solution") -> str:
     if located_none or (solution.status == "infeasible" and any_stable is not False):
         return ""
     is_limited = problem.locate or len(problem.constraints) > len(problem.posed.asked_of_roots)
-    limits = " and satisfies the constraints" if is_limited else ""
-    proof = f"no design within the ranges is stable{limits} (proved)"
+    limits = " that satisfies the constraints" if is_limited else ""
+    proof = f"no design within the ranges{limits} is stable (proved)"
     doubt = "" if solution.interrupted else "no stable design was found, but not proved that none exists"
     remark = proof if any_stable is False else doubt
     is_sought = solution.stability_sought and not any_stable
