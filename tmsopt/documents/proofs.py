@@ -159,7 +159,8 @@ def _write_exact_numbers(problem: Posed, proof: Proof) -> Parts:
     """Write the numbers assumed exact, and a remark on angles."""
     exact_values = (f"{name} = {_format_fraction(value)}" for name, value in proof.held.items())
     yield Sentence(", ".join((*exact_values, *proof.numbers)), "exact numbers")
-    tangents = {p.name for p in problem.parameter_set.parameters if p.tangent} - set(proof.stated)
+    exact_angles = {*proof.stated, *problem.typed(problem.fixed)}
+    tangents = {p.name for p in problem.parameter_set.parameters if p.tangent} - exact_angles
     if angles := [n for n in proof.held if n in tangents and proof.parameters[n].value != "0"]:
         yield Sentence("the decimal of the double in radians, not an angle in degrees", ", ".join(angles))
 
