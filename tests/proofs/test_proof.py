@@ -599,7 +599,7 @@ def run(*arguments):
 def test_the_command():
     done = run(str(PROBLEMS / "ep4.toml"), "--digits", "40")
     assert done.exit_code == 0
-    assert "proved: a design with EP4 exists" in done.stdout
+    assert "proved: a design with EP4 (4-fold real root) exists" in done.stdout
     assert "2.236317518367822033046344317154434852029" in done.stdout
     assert "zeta_B = -0.4" in done.stdout
     data = json.loads(run(str(PROBLEMS / "heavily_damped.toml"), "--json", "--exact", "lambda_s=10 deg").stdout)
