@@ -240,7 +240,7 @@ def test_proofs_leave_what_is_proved(run, monkeypatch, number, status):
     assert (ended, json.loads(out)["completeness"]["complete"]) == (status, False)
 
 
-@pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+@pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 @pytest.mark.parametrize("where", ["tmsopt.global_search.race SolverPool.race", "tmsopt.proofs.certify find_exclusion"])
 def test_a_proof_that_is_stopped_leaves_the_design(run, monkeypatch, where, tmp_path):
     """While SCIP is at work, and while a question to it is made."""
@@ -282,7 +282,7 @@ def test_what_is_said_beside_a_design_may_be_stopped(run, monkeypatch):
     assert "four roots coincide (EP4)" in out
 
 
-@pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+@pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 def test_what_a_global_solver_raises_is_heard(run, monkeypatch, tmp_path):
     race = import_module("tmsopt.global_search.race")
     process = Killable()

@@ -13,7 +13,7 @@ from tmsopt.models import from_coefficients
 
 asking = import_module("tmsopt.global_search.stability")
 
-scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+scip = pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 
 SECONDS = 10.0  # twenty times what any of these needs
 X, Y = ca.SX.sym("x"), ca.SX.sym("y")
@@ -47,7 +47,7 @@ def find_damped(most, known=None, **asked):
 def test_boxes_without_a_stable_design(coefficients, free, asked):
     stated = problem(coefficients, free, **asked)
     for known in (None, stated.ordered({n: hi for n, (_, hi) in free.items()})):
-        assert find_stable_design(stated, SECONDS, known_design=known).any is False
+        assert find_stable_design(stated, SECONDS, known_design=known).exists is False
 
 
 @scip
@@ -55,14 +55,14 @@ def test_boxes_without_a_stable_design(coefficients, free, asked):
 def test_a_stable_design_is_found(most):
     """Be it one in a thousand."""
     found = find_damped(most)
-    assert found.any is True
+    assert found.exists is True
     assert 2 < found.design["x"] <= most
 
 
 @scip
 def test_limits_hold_for_what_is_found():
     found = find_damped(9, constraints={"most": "x**2 <= 5", "rest": "abscissa >= 1"})
-    assert found.any is True
+    assert found.exists is True
     assert 4 < found.design["x"] ** 2 <= 5 * (1 + 1e-9)  # the recheck's own tolerance
 
 
@@ -78,7 +78,7 @@ def test_limits_hold_for_what_is_found():
 def test_of_designs_on_the_axis_nothing_is_said(coefficients, most):
     """What is refuted is that roots may lie left of the axis or on it, and here they may."""
     began = time.perf_counter()
-    assert find_stable_design(problem(coefficients, {"x": (0, most)}), 60.0).any is None
+    assert find_stable_design(problem(coefficients, {"x": (0, most)}), 60.0).exists is None
     assert time.perf_counter() - began < 10  # and no time is spent on it
 
 

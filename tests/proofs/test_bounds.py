@@ -39,7 +39,7 @@ def decide(nlp, seconds=5.0, **options):
     return SCIP.decide(make_task(nlp, seconds, **options))
 
 
-scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+scip = pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 
 # Interlacing. The polynomials are products of rational factors, so where their roots are is known without computing
 # any, on the axis too.

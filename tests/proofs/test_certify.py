@@ -32,7 +32,7 @@ interlaces = import_module("tmsopt.global_search.interlacing")
 started = import_module("tmsopt.killable")
 lines = import_module("tmsopt.global_search.half_planes")
 
-pytestmark = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+pytestmark = pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 
 HEIGHTS = {"mu": 0.1, "chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2}
 OMEGA0 = -((0.4 * 0.2) ** -0.25)  # where chi_H = 1

@@ -21,7 +21,7 @@ from tmsopt.roots.patterns import find_patterns, has_pattern
 
 factored = import_module("tmsopt.proofs.factorisation")
 
-scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+scip = pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 
 R6 = math.sqrt(15) / 5
 
@@ -306,7 +306,7 @@ def test_what_is_no_multiple_root_is_refused():
     problem = boxed(free_polynomial(6), -50.0, 50.0, locate="EP2")
     proof = prove_design(problem.posed, dict(zip(names, map(float, c[1:]), strict=True)), "EP2", 20)
     assert not proof.proved
-    assert "not the design's" in proof.reason
+    assert "not the stored design" in proof.reason
     assert proof.stable.holds is True
 
 

@@ -19,7 +19,7 @@ from tmsopt.global_search import (
 )
 from tmsopt.models import tms
 
-pytestmark = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+pytestmark = pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 
 FIXED = {"Fr": 2.0, "mu": 0.5, "chi_B": 1.3, "chi_H": 1.0, "zeta_B": -0.6, "zeta_H": -0.3, "lambda_s": 0.5}
 CAPSIZE = {**FIXED, "chi_H": 1.2, "mu": 5.0}  # a4 < 0 for tan λ_s < 5/3: one root s > 0, so ζ = −1

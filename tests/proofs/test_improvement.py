@@ -14,7 +14,7 @@ from tmsopt.models import from_coefficients
 
 improving = import_module("tmsopt.proofs.improvement")
 
-pytestmark = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+pytestmark = pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 
 SECONDS = 20.0  # ten times what any of these needs
 X = ca.SX.sym("x")

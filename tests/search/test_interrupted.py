@@ -99,7 +99,7 @@ def test_of_an_infeasible_problem_the_least_violating_design_is_left(chosen):
     assert "limit" in found.violations
 
 
-@pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+@pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 def test_the_question_for_a_stable_design_is_shown_and_can_be_stopped(monkeypatch):
     """s² + (x − 2) s + 1, stable where x > 2: at x = 1 the roots are 1/2 ± i √3/2."""
     monkeypatch.setattr(asking, "has_no_stable_design", lambda problem: False)

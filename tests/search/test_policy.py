@@ -112,8 +112,8 @@ def settled(ends, share=0.5, far_off=False, left=0):
     failed = make_failed_end(Start({}), nlp)
     ended = tuple(failed if e is None else replace(failed, objective=e, feasible=True) for e in ends)
     refined = sampling.DesignBatch(np.zeros((left, 1)), np.zeros(left), np.zeros(left))
-    box = SimpleNamespace(narrow=share < tmsopt.TUNING.narrow)
-    sample = SimpleNamespace(box=box, far_off=far_off, refined=refined, leaders=refined)
+    box = SimpleNamespace(is_narrow=share < tmsopt.TUNING.narrow)
+    sample = SimpleNamespace(box=box, is_far_off=far_off, refined=refined, leaders=refined)
     return bool(POLICY.enough(SearchState(PLAIN, PLAIN, nlp, sample=sample, ends=ended)))
 
 

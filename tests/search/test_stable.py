@@ -13,7 +13,7 @@ from tmsopt.models import from_coefficients
 
 solving = import_module("tmsopt.search.solve")
 
-scip = pytest.mark.skipif(not SCIP.available, reason="SCIP is not installed")
+scip = pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 
 NONE = "no design within the ranges is stable (proved)"
 BOUND = "no design within the ranges is stable and satisfies the constraints (proved)"
@@ -85,7 +85,7 @@ def test_a_stable_design_that_the_search_missed_is_found():
     """The best design of the box 0 ≤ x ≤ 1, sold as that of 0 ≤ x ≤ 3, where −1/2 is least, at x = 3."""
     part = found(1.0, stability=0.0)
     missed = replace(part, problem=replace(part.problem, free={"x": (0.0, 3.0)}))
-    design = solving._add_stability(missed, tmsopt.Options(stability=10.0), time.perf_counter(), tmsopt.POLICY)
+    design = solving._search_stable_design(missed, tmsopt.Options(stability=10.0), time.perf_counter(), tmsopt.POLICY)
     assert (design.status, design.stable, design.any_stable) == ("optimal", True, True)
     assert design.value == pytest.approx(-0.5, abs=1e-12)
     assert any("stable design that branch and bound found" in note for note in design.notes)

@@ -165,7 +165,7 @@ def _first_order_lever(solution: Solution, name: str) -> Lever:
 def _solve_moved(solution: Solution, problem: Posed, starts: int, sample: bool) -> Solution:
     """Solve a problem with moved limits, starting at the optimum; with `sample`, also search the whole box."""
     options = replace(DEFAULTS, starts=starts, near={n: solution.parameters[n] for n in problem.free})
-    return solve_any_status(problem, options, without_sample=not sample, bound=False)
+    return solve_any_status(problem, options, without_sample=not sample, with_bound=False)
 
 
 def _has_remote_optimum(solution: Solution, levers: Sequence[Lever]) -> bool:

@@ -1,6 +1,7 @@
 """How far a design is from weave, capsize, infinity and heavy damping: the robustness radius.
 
-`nearest` finds the nearest point of one boundary for a design with weighted parameters, `robustness` the points of all.
+For a design with weighted parameters, `nearest` finds the nearest point of one boundary, and `robustness` the nearest
+point of each boundary.
 """
 
 import lazy_loader

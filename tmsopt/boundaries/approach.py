@@ -1,4 +1,7 @@
-"""Finds the nearest point of one edge from a start. All designs of a model share the compiled NLP of an edge."""
+"""Finds the nearest point of one edge (a piece of a boundary) from a start.
+
+All designs of a model share the compiled NLP of an edge.
+"""
 
 import math
 from collections.abc import Callable
@@ -18,13 +21,14 @@ from tmsopt.records import Array
 SAME_DISTANCE = 1e-9
 """Relative difference below which distances count as equal."""
 
-_ITERATIONS, _UNFINISHED = 200, "Maximum_Iterations_Exceeded"  # largest number, and the status if it is reached
-_FEASIBLE = 1e-10  # largest violation, in scaled coefficients, of a point on the edge
-_STATIONARY = 1e-8  # largest gradient of the Lagrangian at a nearest point
-_SHIFTED = 1e-8  # largest change of the squared distance, relative to it, that the violation can cause
+_MAX_ITERATIONS = 200  # iterations of one run of the solver
+_UNFINISHED = "Maximum_Iterations_Exceeded"  # status of a run that reaches this number
+_MAX_VIOLATION = 1e-10  # largest violation of the equations, in scaled coefficients, of a point on the edge
+_MAX_GRADIENT = 1e-8  # largest gradient of the Lagrangian at a nearest point
+_MAX_SHIFT = 1e-8  # largest relative change of the squared distance that the violation may cause
 _MAX_PROGRAMS = 64  # in the cache, one for each edge and model
 _WEIGHT, _SCALE, _SIZE, _SIGN = "weight of ", "scale ", "size ", "sign of a0"
-"""Names of the numbers of a program other than the parameters, whose names have no blanks."""
+"""Names of the numbers of a program that are no parameters; names of parameters have no blanks."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +36,9 @@ class EdgePoint:
     """The point at which one run of a solver ends, as a displacement u in units of the weights.
 
     Attributes:
-        refined: whether the conditions of a nearest point hold to rounding. Near roots of multiplicity 5 or 6 they may
-            not: there a small violation of the equations still changes the distance.
+        u: the displacement; empty if there is no point.
+        refined: whether the conditions of a nearest point hold up to rounding. Near roots of multiplicity 5 or 6 they
+            may not hold, because there a small violation of the equations still changes the distance.
     """
 
     u: Array = field(default_factory=lambda: np.zeros(0))
@@ -46,20 +51,20 @@ class EdgePoint:
 
 
 Method = Callable[..., Callable[[Array], Run]]
-"""`make_ipopt` or `make_sqp`: makes a solver of an NLP."""
+"""`make_ipopt` or `make_sqp`: an NLP → its solver."""
 
 
-def make_approach(
+def make_edge_search(
     base: WeightedDesign, edge: Edge, sign: float, size: float, method: Method
 ) -> Callable[[Array, EdgePoint], EdgePoint]:
-    """A function (start, best point so far) → the nearest point of an edge, or the best point if the run fails.
+    """Return a function (start, best point so far) → the nearest point of an edge, or the best point if the run fails.
 
     Args:
-        sign: sign of a0 on the side of the edge that is stable or heavily damped.
+        sign: sign of a0 on the stable, or heavily damped, side of the edge.
         size: expected distance, the unit in which the NLP measures.
     """
     n = len(base.weights)
-    template = _nlp(base.problem.model, base.problem.parameter_set.name, tuple(base.weights), edge)
+    template = _build_program(base.problem.model, base.problem.parameter_set.name, tuple(base.weights), edge)
     numbers = [base.parameters[name] for name in base.problem.parameter_set.names]
     numbers += [*base.weights.values(), *base.scale.tolist(), *base.sizes.tolist(), sign, size]
     nlp = replace(
@@ -68,7 +73,7 @@ def make_approach(
         upper=(*(base.upper / size).tolist(), *template.upper[n:]),
         numbers=dict(zip(template.formula.names[len(template.variables) :], numbers, strict=True)),
     )
-    run, polish = method(nlp, max_iterations=_ITERATIONS), make_polisher(nlp)
+    run, polish = method(nlp, max_iterations=_MAX_ITERATIONS), make_polisher(nlp)
 
     def solve_from(u: Array, best: EdgePoint) -> EdgePoint:
         c = sign * base.coefficients(u)
@@ -80,41 +85,44 @@ def make_approach(
         if float(np.linalg.norm(run_end.x[:n])) * size >= best.distance * (1 - SAME_DISTANCE):
             return best
         point = polish(run_end, nlp)
-        if not point.violation <= _FEASIBLE:
+        if not point.violation <= _MAX_VIOLATION:
             return best
         u_found = np.clip(point.x[:n] * size, base.lower, base.upper)
         shift = point.violation * float(np.abs(point.row_multipliers).max(initial=0.0))
-        return EdgePoint(u_found, point.stationarity <= _STATIONARY and shift <= _SHIFTED * point.objective)
+        return EdgePoint(u_found, point.stationarity <= _MAX_GRADIENT and shift <= _MAX_SHIFT * point.objective)
 
     return solve_from
 
 
 @lru_cache(maxsize=_MAX_PROGRAMS)
-def _nlp(model: Model, set_name: str, weighted: tuple[str, ...], edge: Edge) -> NLP:
-    """Minimise y·y with y = u/size over the displacements u and the unknowns of the edge, for every design.
+def _build_program(model: Model, set_name: str, weighted_names: tuple[str, ...], edge: Edge) -> NLP:
+    """Build the program that minimises y·y, y = u/size, over displacements u and the unknowns of the edge.
 
-    The numbers of the NLP are the parameters, the weights, the scales and sizes of the coefficients, the sign of a0,
-    and the size.
+    All designs of a model share it: its numbers are the parameters, the weights, the scales and sizes of the
+    coefficients, the sign of a0, and the size.
     """
-    parameter_set, n, extra = model.parameter_set(set_name), len(weighted), len(edge.unknowns)
-    x = [symbol(variable_name(k)) for k in range(n + extra)]
-    numbers = [*parameter_set.names, *(_WEIGHT + name for name in weighted)]
+    parameter_set, n, unknown_count = model.parameter_set(set_name), len(weighted_names), len(edge.unknowns)
+    x = [symbol(variable_name(k)) for k in range(n + unknown_count)]
+    numbers = [*parameter_set.names, *(_WEIGHT + name for name in weighted_names)]
     numbers += [f"{kind}{k}" for kind in (_SCALE, _SIZE) for k in range(model.degree + 1)] + [_SIGN, _SIZE]
     symbols = {name: symbol(name) for name in numbers}
-    displaced = {
-        name: symbols[name] + symbols[_WEIGHT + name] * symbols[_SIZE] * y for name, y in zip(weighted, x, strict=False)
+    displaced_parameters = {
+        name: symbols[name] + symbols[_WEIGHT + name] * symbols[_SIZE] * y
+        for name, y in zip(weighted_names, x, strict=False)
     }
-    a = model.coefficients({name: displaced.get(name, symbols[name]) for name in parameter_set.names}, parameter_set)
+    a = model.coefficients(
+        {name: displaced_parameters.get(name, symbols[name]) for name in parameter_set.names}, parameter_set
+    )
     c = [symbols[_SIGN] * coefficient / symbols[f"{_SCALE}{k}"] for k, coefficient in enumerate(a)]
     equations = [e / symbols[f"{_SIZE}{k}"] for k, e in edge.equations(c, x[n:]).items()]
     inequalities = edge.nonnegative(x[n:])
     rows = [*equations, *inequalities]
     return NLP(
         formulation="nearest",
-        variables=(*weighted, *edge.unknowns),
+        variables=(*weighted_names, *edge.unknowns),
         formula=formula([sum(y * y for y in x[:n]), *rows], (*(y.value for y in x), *numbers)),
         numbers={},
-        lower=(-np.inf,) * n + (0.0,) * extra,
+        lower=(-np.inf,) * n + (0.0,) * unknown_count,
         upper=(*(np.inf,) * n, *edge.unknowns.values()),
         rows=(*[edge.name] * len(equations), *["others"] * len(inequalities)),
         row_lower=(0.0,) * len(rows),

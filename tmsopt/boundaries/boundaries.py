@@ -17,13 +17,13 @@ from tmsopt.roots import discriminant, is_stable, product, real_roots, rebuilt, 
 EDGE_TOLERANCE = 1e-10
 """A polynomial within this relative change of its coefficients counts as on an edge."""
 
-_LEAD = 1e-9  # smallest leading coefficient for computing roots, relative to the largest coefficient
-_SMALL = 1e-3  # smallest size of a root in the sizes of terms, relative to the median root
+_MIN_LEAD = 1e-9  # relative to the largest coefficient: least leading coefficient for computing roots
+_MIN_ROOT = 1e-3  # relative to the median root: least size of a root for the sizes of terms
 
 
 @dataclass(frozen=True)
 class Edge:
-    """A piece of a boundary: all multiples of a divisor by a cofactor without roots in Re s > 0, given by its factors.
+    """A piece of a boundary: all products of a divisor and a cofactor without roots in Re s > 0, given by its factors.
 
     A divisor with an unknown root is e s² + 1 − e, or e s + 1 − e squared; its root is at infinity for e = 0. A
     cofactor of odd degree above 2 has one linear factor f s + 1 − f. Its first quadratic factor has any size; the
@@ -32,14 +32,15 @@ class Edge:
     Attributes:
         name: ``weave``, ``capsize``, ``infinity``, ``EP2``; ``capsize, real`` and ``infinity, real`` if all other roots
             are real; ``real`` for heavy damping itself, approached from outside.
-        real: whether the roots of the cofactor are real; else they are not right of the axis.
-        divisor: the divisor as a function of e.
-        candidates: values of e for numeric coefficients; None for a divisor without e.
+        degree: degree of the polynomial.
+        is_real: whether the roots of the cofactor are real; else they are only not right of the axis.
+        divisor: e → the divisor.
+        candidates: numeric coefficients → values of e to try; None for a divisor without e.
     """
 
     name: str
     degree: int
-    real: bool
+    is_real: bool
     divisor: Callable[[Any], list[Any]]
     candidates: Callable[[Array], list[float]] | None = None
 
@@ -56,17 +57,17 @@ class Edge:
 
     @property
     def _roots(self) -> str:
-        """Unknowns e and f of the root of the divisor and of the linear factor, if there are any."""
+        """Names of the unknowns for the root of the divisor (e) and of the linear factor (f), if there are any."""
         degree = self._cofactor_degree
         return "e" * (self.candidates is not None) + "f" * (degree > 2 and degree % 2)
 
     def factors(self, u: Sequence[Any]) -> list[list[Any]]:
         """The divisor and each factor of the cofactor, from the unknowns."""
         root_values = dict(zip(self._roots, u, strict=False))
-        first = len(root_values)
+        count = len(root_values)
         linear = [[f, 1 - f] for name, f in root_values.items() if name == "f"]
-        scaled = [[u[k], u[k + 1], 1 - u[k] - u[k + 1]] for k in range(first + 3, len(u), 2)]
-        return [self.divisor(root_values.get("e", 0.0)), *linear, list(u[first : first + 3]), *scaled]
+        scaled = [[u[k], u[k + 1], 1 - u[k] - u[k + 1]] for k in range(count + 3, len(u), 2)]
+        return [self.divisor(root_values.get("e", 0.0)), *linear, list(u[count : count + 3]), *scaled]
 
     def equations(self, c: Sequence[Any], u: Sequence[Any]) -> dict[int, Any]:
         """Index of a coefficient → an expression of coefficients and unknowns that must be 0."""
@@ -75,13 +76,15 @@ class Edge:
     def nonnegative(self, u: Sequence[Any]) -> list[Any]:
         """Expressions of the unknowns that must be ≥ 0: the other roots are not right of the axis, or are real."""
         quadratics = [factor for factor in self.factors(u)[1:] if len(factor) == 3]
-        return [c for _, _, c in quadratics[1:]] + ([b * b - 4 * a * c for a, b, c in quadratics] if self.real else [])
+        return [c for _, _, c in quadratics[1:]] + (
+            [b * b - 4 * a * c for a, b, c in quadratics] if self.is_real else []
+        )
 
     def guess(self, c: Array) -> list[float]:
-        """Unknowns near numeric coefficients.
+        """Guess the unknowns for numeric coefficients.
 
-        The divisor is the candidate that divides c best. The quadratic factors of the quotient have pairs of
-        neighbouring roots, and the linear factor has the rightmost real root.
+        The divisor is the candidate that divides c best. Each quadratic factor of the quotient has two neighbouring
+        roots, and the linear factor has the rightmost real root.
         """
         size = measure_terms(c)
 
@@ -103,25 +106,25 @@ class Edge:
             linear, guess = [[f, 1 - f]], [*guess, f]
             z = np.delete(z, np.flatnonzero(z == rightmost)[0])
         order = np.lexsort((z.imag, np.abs(z.imag), z.real, z.imag == 0))
-        first, second = z[order].reshape(-1, 2).T
-        nonnegative = np.maximum(np.stack([np.ones(len(first)), -(first + second).real, (first * second).real], 1), 0.0)
-        scaled = nonnegative / nonnegative.sum(axis=1, keepdims=True)
-        whole = np.array(product(*linear, *scaled), dtype=float)
-        factor = max(float(whole @ cofactor) / float(whole @ whole), 0.0)
+        z1, z2 = z[order].reshape(-1, 2).T
+        quadratics = np.maximum(np.stack([np.ones(len(z1)), -(z1 + z2).real, (z1 * z2).real], 1), 0.0)
+        scaled = quadratics / quadratics.sum(axis=1, keepdims=True)
+        scaled_cofactor = np.array(product(*linear, *scaled), dtype=float)
+        factor = max(float(scaled_cofactor @ cofactor) / float(scaled_cofactor @ scaled_cofactor), 0.0)
         return [*guess, *(factor * scaled[0]).tolist(), *scaled[1:, :2].ravel().tolist()]
 
 
 @lru_cache(maxsize=16)
 def list_edges(degree: int) -> Table[Edge]:
-    """All pieces of the boundaries for polynomials of a degree ≥ 2, by name.
+    """All pieces of the boundaries for polynomials of a degree ≥ 2: name → edge.
 
-    For a polynomial that is not heavily damped, the nearest one with real roots alone is on one edge or on several.
+    For a polynomial that is not heavily damped, the nearest heavily damped one is on at least one edge.
     """
     edges = (
-        Edge("weave", degree, False, lambda e: [e, 0, 1 - e], _pairs),
+        Edge("weave", degree, False, lambda e: [e, 0, 1 - e], _guess_pairs),
         Edge("capsize", degree, False, lambda e: [1, 0]),
         Edge("infinity", degree, False, lambda e: [0, 1]),
-        Edge("EP2", degree, True, lambda e: [e * e, 2 * e * (1 - e), (1 - e) * (1 - e)], _doubles),
+        Edge("EP2", degree, True, lambda e: [e * e, 2 * e * (1 - e), (1 - e) * (1 - e)], _guess_double_roots),
         Edge("capsize, real", degree, True, lambda e: [1, 0]),
         Edge("infinity, real", degree, True, lambda e: [0, 1]),
         Edge("real", degree, True, lambda e: [1]),
@@ -129,18 +132,18 @@ def list_edges(degree: int) -> Table[Edge]:
     return Table({edge.name: edge for edge in edges})
 
 
-def _pairs(c: Array) -> list[float]:
+def _guess_pairs(c: Array) -> list[float]:
     """The values of e of the divisor e s² + 1 − e, as if each pair were on the axis."""
     z = roots(replace_small_lead(c))
     return [float(1 / (1 + abs(x) ** 2)) for x in z[z.imag > 0]] + [0.0, 1.0]
 
 
-def _doubles(c: Array) -> list[float]:
+def _guess_double_roots(c: Array) -> list[float]:
     """The values of e of the divisor (e s + 1 − e)², as if two neighbouring roots were equal."""
     z = roots(replace_small_lead(c))
-    real = np.sort(z[z.imag == 0].real)
-    doubles = [*((real[1:] + real[:-1]) / 2), *z[z.imag > 0].real]
-    return [float(1 / (1 - x)) for x in doubles if x < 0] or [1 / (1 + float(np.abs(z).mean()))]
+    x = np.sort(z[z.imag == 0].real)
+    double_roots = [*((x[1:] + x[:-1]) / 2), *z[z.imag > 0].real]
+    return [float(1 / (1 - root)) for root in double_roots if root < 0] or [1 / (1 + float(np.abs(z).mean()))]
 
 
 def is_heavily_damped(c: Array) -> Truth:
@@ -150,47 +153,53 @@ def is_heavily_damped(c: Array) -> Truth:
     16 c0² c1 c3 − 3 c1⁴ < 0. A cubic or a quadratic has only real roots if Δ > 0. For higher degrees the real roots are
     counted.
     """
-    columns, damped = [*np.moveaxis(c, -1, 0)], np.asarray(is_stable(c, exact=False))
+    columns, is_damped = [*np.moveaxis(c, -1, 0)], np.asarray(is_stable(c, exact=False))
     if len(columns) > 5:
-        return _has_all_real_roots(c, damped)
+        return _has_only_real_roots(c, is_damped)
     if len(columns) > 2:
-        damped = damped & (discriminant(columns) > 0)
+        is_damped = is_damped & (discriminant(columns) > 0)
     if len(columns) == 5:
         a, b, p, q, r = columns
-        second = 64 * a**3 * r - 16 * a * a * p * p + 16 * a * b * b * p - 16 * a * a * b * q - 3 * b**4
-        damped = damped & (8 * a * p < 3 * b * b) & (second < 0)
-    return np.asarray(damped)
+        condition = 64 * a**3 * r - 16 * a * a * p * p + 16 * a * b * b * p - 16 * a * a * b * q - 3 * b**4
+        is_damped = is_damped & (8 * a * p < 3 * b * b) & (condition < 0)
+    return np.asarray(is_damped)
 
 
-def _has_all_real_roots(c: Array, stable: Truth) -> Truth:
-    """Whether all roots are real; Newton's c_k² > (1 + 1/k)(1 + 1/(n − k)) c_{k−1} c_{k+1} is tested first."""
+def _has_only_real_roots(c: Array, is_candidate: Truth) -> Truth:
+    """Which candidates have only real roots.
+
+    Newton's necessary condition c_k² > (1 + 1/k)(1 + 1/(n − k)) c_{k−1} c_{k+1} is tested first.
+    """
     n = c.shape[-1] - 1
     k = np.arange(1, n)
-    newton = c[..., 1:-1] ** 2 > (1 - 1e-9) * (1 + 1 / k) * (1 + 1 / (n - k)) * c[..., :-2] * c[..., 2:]
-    damped = np.asarray(stable & np.all(newton, axis=-1))
-    damped[damped] = real_roots(c[damped], exact=False)[0] == n
-    return damped
+    meets_newton = c[..., 1:-1] ** 2 > (1 - 1e-9) * (1 + 1 / k) * (1 + 1 / (n - k)) * c[..., :-2] * c[..., 2:]
+    has_real_roots = np.asarray(is_candidate & np.all(meets_newton, axis=-1))
+    has_real_roots[has_real_roots] = real_roots(c[has_real_roots], exact=False)[0] == n
+    return has_real_roots
 
 
-def find_crossed_edges(c: Array, heavy: bool) -> tuple[str, ...]:
-    """The edges that a polynomial just outside has crossed; c has the sign of a0 on the inner side."""
-    crossed = [n for n, k in (("capsize", -1), ("infinity", 0)) if c[k] <= 0]
-    if heavy:
-        return tuple(f"{n}, real" for n in crossed) or ("EP2",)
-    return tuple(crossed) or ("weave",)
+def find_crossed_edges(c: Array, is_damping: bool) -> tuple[str, ...]:
+    """The edges of stability, or of heavy damping, that a polynomial just outside has crossed.
+
+    The coefficients c are multiplied by the sign of a0 on the inner side.
+    """
+    crossed_names = [n for n, k in (("capsize", -1), ("infinity", 0)) if c[k] <= 0]
+    if is_damping:
+        return tuple(f"{n}, real" for n in crossed_names) or ("EP2",)
+    return tuple(crossed_names) or ("weave",)
 
 
 def replace_small_lead(c: Array) -> Array:
     """The coefficients, with the leading one made large enough for computing roots."""
     size = float(np.abs(c).max()) or 1.0
-    return np.concatenate([[c[0] if abs(c[0]) > _LEAD * size else _LEAD * size], c[1:]])
+    return np.concatenate([[c[0] if abs(c[0]) > _MIN_LEAD * size else _MIN_LEAD * size], c[1:]])
 
 
 def measure_terms(c: Array) -> Array:
     """Size of the terms whose sum is each coefficient; a root at 0 counts as a thousandth of the median root."""
     lead = replace_small_lead(c)
     radius = np.abs(roots(lead))
-    min_size = _SMALL * (float(np.median(radius)) or 1.0)  # 1 if all are 0
+    min_size = _MIN_ROOT * (float(np.median(radius)) or 1.0)  # 1 if all are 0
     return np.asarray(abs(lead[0]) * rebuilt(-np.maximum(radius, min_size).astype(complex)))
 
 

@@ -1,7 +1,7 @@
-"""Checks in exact arithmetic that a point that a solver found is on a boundary.
+"""Checks in exact arithmetic whether a point that a solver found is on a boundary.
 
-A solver can satisfy the equations of a boundary at points around which stability does not change: where coefficients
-are differences of large numbers, or where all coefficients vanish.
+A solver can satisfy the equations of a boundary at points near which stability does not change: where coefficients are
+differences of large numbers, or where all coefficients vanish.
 """
 
 from collections.abc import Iterator
@@ -19,49 +19,54 @@ from tmsopt.roots import exact_roots, is_stable, multiple_real_roots, routh, shi
 BITS = 400
 """Precision in bits of the intervals that decide signs; an undecided sign counts as 0."""
 
-_REACHES = (1e-6, 1e-4, 1e-2)  # radii around a point at which stability is tested, relative to its distance
+_TEST_RADII = (1e-6, 1e-4, 1e-2)  # radii around a point at which stability is tested, relative to its distance
 _MIN_RADIUS = 1e-9  # smallest change that doubles resolve, in weights
 _MAX_TESTS = 4  # designs for each radius that exact arithmetic tests
-_SHIFTS, _NEAR = (1e-4, 1e-3, 1e-2), 0.05  # shifts of the roots; largest displacement, relative to the distance
-_ROUNDS, _STEP = 4, 1e-6  # Gauss–Newton steps; step of their finite differences
-_NONE = 1e-10  # a coefficient below this part of its terms counts as 0
+_SHIFTS = (1e-4, 1e-3, 1e-2)  # distances by which all roots are moved left
+_MAX_DISPLACEMENT = 0.05  # largest distance that such a move may shift the point, relative to its own distance
+_STEP_COUNT = 4  # Gauss–Newton steps of such a move
+_STEP = 1e-6  # step of their finite differences
+_NEGLIGIBLE = 1e-10  # a coefficient below this part of its terms counts as 0
 
 
-def is_boundary(base: WeightedDesign, u: Array, heavy: bool) -> bool:
-    """Whether a displacement leads to a change of stability, or to the edge of heavy damping.
+def is_boundary(base: WeightedDesign, u: Array, is_damping: bool) -> bool:
+    """Whether stability, or heavy damping if `is_damping`, changes at a displacement from the design.
 
-    Exact arithmetic must find a design next to the point whose stability differs from that of the design itself. The
-    edge of heavy damping may be the tip of a cusp for a design outside it; then it suffices that all roots at the point
+    Exact arithmetic must find a point nearby at which the verdict differs from the verdict on the design itself. For a
+    design that is not heavily damped, the point may be the tip of a cusp; then it is enough that all roots at the point
     are real and negative.
     """
     c = base.coefficients(u)
     if not u.any():
         return True  # the design itself is on the edge
-    if not np.all(np.isfinite(c)) or np.all(np.abs(c) <= _NONE * base.sizes):
+    if not np.all(np.isfinite(c)) or np.all(np.abs(c) <= _NEGLIGIBLE * base.sizes):
         return False
-    own_verdict = base.heavily_damped if heavy else base.stable
-    if heavy and not own_verdict and np.all(np.abs(c) > _NONE * base.sizes):
+    own_verdict = base.is_heavily_damped if is_damping else base.is_stable
+    if is_damping and not own_verdict and np.all(np.abs(c) > _NEGLIGIBLE * base.sizes):
         roots = multiple_real_roots(c, EDGE_TOLERANCE)
         if roots is not None and all(r.re < 0 for r in roots):
             return True
-    test = _has_negative_real_roots if heavy else is_exactly_stable
+    test = _has_negative_real_roots if is_damping else is_exactly_stable
     return any(
-        test(base.problem, base.design(v)) != own_verdict for v in _find_changes_nearby(base, u, heavy, own_verdict)
+        test(base.problem, base.design(v)) != own_verdict
+        for v in _find_changes_nearby(base, u, is_damping, own_verdict)
     )
 
 
-def _find_changes_nearby(base: WeightedDesign, u: Array, heavy: bool, own_verdict: bool) -> Iterator[Array]:
-    """Displacements near u at which the test in doubles differs from the verdict for the design itself."""
+def _find_changes_nearby(base: WeightedDesign, u: Array, is_damping: bool, own_verdict: bool) -> Iterator[Array]:
+    """Yield displacements near u for which the test in doubles differs from the verdict on the design itself."""
     size = float(np.linalg.norm(u))
     rays = np.concatenate([[u / size, -u / size], list_directions(base)])
-    for reach in _REACHES:
-        points = np.clip(u + max(reach * size, _MIN_RADIUS) * rays, base.lower, base.upper)
+    for radius in _TEST_RADII:
+        points = np.clip(u + max(radius * size, _MIN_RADIUS) * rays, base.lower, base.upper)
         c = base.coefficients(points)
-        verdict = is_heavily_damped(np.sign(c[:, :1]) * c) if heavy else is_stable(c, exact=False)
+        verdict = is_heavily_damped(np.sign(c[:, :1]) * c) if is_damping else is_stable(c, exact=False)
         yield from points[np.flatnonzero(verdict != own_verdict)[:_MAX_TESTS]]
-    if not heavy and not own_verdict:  # towards a corner with a multiple root, stable designs are few
+    if not is_damping and not own_verdict:  # near a multiple root, few designs are stable
         yield from (
-            v for left in _SHIFTS if np.linalg.norm((v := _shift_roots_left(base, u, left)) - u) <= _NEAR * size
+            v
+            for step in _SHIFTS
+            if np.linalg.norm((v := _shift_roots_left(base, u, step)) - u) <= _MAX_DISPLACEMENT * size
         )
 
 
@@ -69,7 +74,7 @@ def _shift_roots_left(base: WeightedDesign, u: Array, step: float) -> Array:
     """A displacement that moves all roots left by a step, roots at infinity too; found by Gauss–Newton steps."""
     target = shift(shift(base.coefficients(u).tolist(), step)[::-1], step)[::-1]
     v = u
-    for _ in range(_ROUNDS):
+    for _ in range(_STEP_COUNT):
         steps = _STEP * np.eye(len(u))
         slope = (base.coefficients(v + steps) - base.coefficients(v - steps)) / (2 * _STEP)
         v = v + np.linalg.lstsq(slope.T, np.array(target) - base.coefficients(v), rcond=None)[0]
@@ -80,18 +85,18 @@ def _shift_roots_left(base: WeightedDesign, u: Array, step: float) -> Array:
 def is_exactly_stable(problem: Posed, parameters: Numbers) -> bool:
     """Whether all roots of the design as stored are proved to be left of the imaginary axis, by intervals."""
     with flint.ctx.workprec(BITS):
-        c = _balls(problem, parameters)
+        c = _coefficient_balls(problem, parameters)
         return all(x * c[0] > 0 for x in routh(c))
 
 
 def _has_negative_real_roots(problem: Posed, parameters: Numbers) -> bool:
     with flint.ctx.workprec(BITS):
-        c = _balls(problem, parameters)
+        c = _coefficient_balls(problem, parameters)
         if c[0].contains(0):
             return False
     return all(root.im == 0 and root.re < 0 for root in exact_roots(c))
 
 
-def _balls(problem: Posed, parameters: Numbers) -> list[flint.arb]:
+def _coefficient_balls(problem: Posed, parameters: Numbers) -> list[flint.arb]:
     balls = {n: flint.arb(float(x)) for n, x in parameters.items()}
     return [flint.arb(c) for c in problem.model.coefficients(balls, problem.parameter_set)]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.boundaries.approach import SAME_DISTANCE, EdgePoint, Method, make_approach
+from tmsopt.boundaries.approach import SAME_DISTANCE, EdgePoint, Method, make_edge_search
 from tmsopt.boundaries.boundaries import Edge, list_edges
 from tmsopt.boundaries.exact_check import is_boundary, is_exactly_stable
 from tmsopt.boundaries.rays import (
@@ -34,9 +34,10 @@ STABILITY = ("weave", "capsize", "infinity")
 KINDS = (*STABILITY, "heavy damping")
 """All boundaries; the boundary of heavy damping has several edges."""
 
-_ROUNDS = 3  # of runs from the crossings on the segment to the best point so far
+_ROUNDS = 3  # rounds of runs; each starts from the crossings on the segment to the best point so far
 _MAX_DESIGNS = 256  # in the cache
-_NOTHING, _SHIFT = 1e-12, 1e-3  # largest value that counts as 0, and a trial change; both relative to the weight
+_ZERO = 1e-12  # relative to the weight: largest value that counts as 0
+_TRIAL_CHANGE = 1e-3  # relative to the weight: change that tests whether a design becomes stable
 
 
 @dataclass(frozen=True, repr=False)
@@ -45,11 +46,11 @@ class Nearest(Printable):
 
     Attributes:
         kind: ``weave``, ``capsize``, ``infinity`` or ``heavy damping``.
-        distance: √Σ ((x − x0)/weight)²; inf where none was found.
-        parameters: every parameter of the point; empty where none was found.
+        distance: √Σ ((x − x0)/weight)²; inf if no point was found.
+        parameters: every parameter of the point; empty if no point was found.
         direction: (x − x0)/weight of each parameter that has a weight.
-        refined: whether the point satisfies the conditions of a locally nearest point to rounding; else it is the best
-            crossing found. It is the nearest point found; a nearer one elsewhere is not excluded.
+        refined: whether the point satisfies the conditions of a locally nearest point up to rounding; else it is the
+            best crossing found. In both cases, a nearer point may exist elsewhere.
         direct: whether the segment from the design to the point crosses no boundary before its end.
 
     Example:
@@ -87,13 +88,14 @@ class Robustness(Printable):
         stable: whether all roots are left of the imaginary axis by more than rounding.
         edges: the boundaries of stability that the design is on up to rounding, at distance 0; its other roots are left
             of the axis.
-        zeros: parameters at 0 each of which alone makes a design on the edge stable, such as a missing damping.
+        zeros: parameters that are 0, if a change of any one of them makes a design on an edge stable, such as a missing
+            damping.
         heavily_damped: whether all roots are real and negative, multiple ones included.
         parameters: every parameter of the design.
         weights: the unit of change of each parameter that may change.
         weave, capsize, infinity: nearest points of the boundaries of stability.
-        heavy_damping: nearest point of the edge of heavy damping: the way out for a heavily damped design, the way in
-            for any other; distance 0 on the edge, as for an EP4.
+        heavy_damping: nearest point of the edge of heavy damping. A heavily damped design would lose heavy damping
+            there, and any other would gain it. The distance is 0 for a design on the edge, such as an EP4.
 
     Example:
         >>> swing = tmsopt.Problem(tmsopt.models.from_coefficients([1, "c", "k"]), fixed={"c": 1.0, "k": 4.0})
@@ -118,7 +120,7 @@ class Robustness(Printable):
 
     @property
     def limit(self) -> Nearest:
-        """The nearest point of the boundary of stability."""
+        """The nearest of the points of `weave`, `capsize` and `infinity`: there stability begins or ends."""
         return min((self.weave, self.capsize, self.infinity), key=lambda n: n.distance)
 
     @property
@@ -128,7 +130,7 @@ class Robustness(Printable):
 
     @property
     def relative(self) -> bool:
-        """Whether the distances are of relative changes."""
+        """Whether the distances measure relative changes, because each weight is the size of its parameter."""
         return all(weight == abs(self.parameters[n]) for n, weight in self.weights.items())
 
     @property
@@ -157,15 +159,16 @@ def nearest(
     """The nearest point of one boundary: ``weave``, ``capsize``, ``infinity`` or ``heavy damping``.
 
     The distance is √Σ ((x − x0)/weight)² over the parameters that have a weight; the others stay fixed. Parameters
-    stay inside their physical ranges; the box and the constraints of the problem are ignored. The edge of heavy damping
-    is the way out for a heavily damped design, and the way in for any other.
+    stay inside their physical ranges; the box and the constraints of the problem are ignored. At the edge of heavy
+    damping, a heavily damped design loses heavy damping, and any other design gains it.
 
     Args:
         design: a solution; or a problem or its file, with `parameters`.
-        parameters: a value per parameter (rad, SI units); by default those of the solution, or all fixed ones.
-        weights: parameter → change that counts as 1; by default the weights of the problem, or else |x0| for every
-            parameter, fixed ones too, except those with a default value (g), so that distances are relative. For
-            x0 = 0 it is 1, or the largest |x0| of the same unit for a parameter with a unit.
+        parameters: parameter → value (rad, SI units); by default the values of the solution, or all fixed values.
+        weights: parameter → change that counts as 1. By default these are the weights of the problem. Without any, the
+            weight of every free or fixed parameter is |x0|, so that distances are relative; parameters with a default
+            value (g) have no weight. If x0 = 0, the weight is 1, or for a parameter with a unit the largest |x0| of the
+            same unit.
         progress: function called with a `tmsopt.Progress` now and then.
 
     Raises:
@@ -183,7 +186,7 @@ def nearest(
         raise input_error(f"unknown boundary {pattern!r}; {suggest(pattern, KINDS)}", "pattern")
     base = _weight_given_design(design, parameters, weights)
     start_steps(progress, f"looking for the nearest {pattern}")
-    return _nearest(base, find_ray_crossings(base), pattern)
+    return _find_nearest(base, find_ray_crossings(base), pattern)
 
 
 def robustness(
@@ -193,7 +196,7 @@ def robustness(
     weights: Numbers | None = None,
     progress: Listener | None = None,
 ) -> Robustness:
-    """The nearest points of all boundaries, and the radius within which a design stays stable.
+    """The nearest point of each boundary, and the radius within which a design stays stable.
 
     Arguments, distances and exceptions are as in `nearest`.
 
@@ -210,9 +213,9 @@ def robustness(
 
 
 def find_stability_margins(problem: Posed, parameters: Numbers) -> Robustness:
-    """Robustness to the boundaries of stability alone, with the weights of the problem; results are cached.
+    """Find the nearest points of the boundaries of stability only, with the weights of the problem; results are cached.
 
-    It does not use IPOPT, which searches for designs.
+    The solver is not IPOPT, because IPOPT also searches for the designs.
     """
     return _measure_margins(problem, Table(parameters), Table(problem.weights))
 
@@ -225,26 +228,29 @@ def _measure_margins(problem: Posed, parameters: Table[float], weights: Table[fl
 def _survey_boundaries(base: WeightedDesign, kinds: Sequence[str] = KINDS, method: Method = make_ipopt) -> Robustness:
     with_damping = "heavy damping" in kinds
     crossings = find_ray_crossings(base, with_damping)
-    points = [_nearest(base, crossings, kind, method) for kind in kinds]
+    points = [_find_nearest(base, crossings, kind, method) for kind in kinds]
     limit = min((n for n in points if n.kind in STABILITY), key=lambda n: n.distance)
-    if limit.found and not limit.direct:  # a nearer crossing is on the segment, but no ray met it
+    if limit.found and not limit.direct:  # the segment has a nearer crossing, which no ray found
         u = np.array([limit.direction[n] for n in base.weights])
         crossings = sorted([*crossings, *find_crossings_on_segment(base, u, with_damping)], key=lambda c: c.distance)
-        points = [_nearest(base, crossings, kind, method) for kind in kinds]
-    stable = base.stable and not base.edges
+        points = [_find_nearest(base, crossings, kind, method) for kind in kinds]
+    stable = base.is_stable and not base.edges
     design_tables = Table(base.parameters), Table(base.weights)
     zeros = _find_stabilising_zeros(base) if base.edges else ()
-    return Robustness(base.problem.problem, stable, base.edges, zeros, base.heavily_damped, *design_tables, *points)
+    return Robustness(base.problem.problem, stable, base.edges, zeros, base.is_heavily_damped, *design_tables, *points)
 
 
 def _find_stabilising_zeros(base: WeightedDesign) -> tuple[str, ...]:
-    """Parameters that are 0; the design becomes stable if any one of them changes."""
+    """Find the parameters that are 0 and make the design stable if one of them changes."""
     parameters = base.parameters
     return tuple(
         n
         for n, weight in base.weights.items()
-        if abs(parameters[n]) <= _NOTHING * weight
-        and any(is_exactly_stable(base.problem, {**parameters, n: shift * weight}) for shift in (_SHIFT, -_SHIFT))
+        if abs(parameters[n]) <= _ZERO * weight
+        and any(
+            is_exactly_stable(base.problem, {**parameters, n: shift * weight})
+            for shift in (_TRIAL_CHANGE, -_TRIAL_CHANGE)
+        )
     )
 
 
@@ -263,50 +269,50 @@ def _weight_given_design(design: Given, parameters: Numbers | None, weights: Num
     return weight_design(problem, problem.ordered(parameters or {}), weights)
 
 
-def _nearest(base: WeightedDesign, crossings: list[RayCrossing], kind: str, method: Method = make_ipopt) -> Nearest:
-    """The nearest point over all pieces of one boundary; for the way into heavy damping, starts need no crossing."""
-    heavy = kind == "heavy damping"
+def _find_nearest(
+    base: WeightedDesign, crossings: list[RayCrossing], kind: str, method: Method = make_ipopt
+) -> Nearest:
+    """Find the nearest point of one boundary, over all its edges; for heavy damping, some starts are no crossings."""
+    is_damping = kind == "heavy damping"
     if base.problem.model.carrier is not None and kind != "weave":  # an eigenfrequency can only cross the real line
         return Nearest(kind)
-    if kind in base.edges or (heavy and base.is_on_damping_edge):
-        zero = dict.fromkeys(base.weights, 0.0)
-        return Nearest(kind, 0.0, Table(base.parameters), Table(zero), refined=True, direct=True)
-    edge_crossings = [s for s in crossings if (s.edge not in STABILITY if heavy else s.edge == kind)]
+    if kind in base.edges or (is_damping and base.is_on_damping_edge):
+        no_change = dict.fromkeys(base.weights, 0.0)
+        return Nearest(kind, 0.0, Table(base.parameters), Table(no_change), refined=True, direct=True)
+    edge_crossings = [s for s in crossings if (s.edge not in STABILITY if is_damping else s.edge == kind)]
     starts: dict[tuple[str, float], list[Array]] = {}
     for crossing in edge_crossings:
         starts.setdefault((crossing.edge, crossing.sign), []).append(crossing.u)
-    if heavy and not base.heavily_damped:
+    if is_damping and not base.is_heavily_damped:
         sign = float(np.sign(base.coefficients(np.zeros(len(base.weights)))[0]))
         starts.setdefault(("real", sign), []).extend(find_most_damped(base, sign))
-    pieces = list_edges(base.problem.model.degree)
-    ends = [_find_nearest_on_edge(base, pieces[edge], sign, points, method) for (edge, sign), points in starts.items()]
-    best = min([EdgePoint(), *ends], key=lambda each: each.distance)
+    edges = list_edges(base.problem.model.degree)
+    ends = [_find_nearest_on_edge(base, edges[name], sign, points, method) for (name, sign), points in starts.items()]
+    best = min([EdgePoint(), *ends], key=lambda end: end.distance)
     if edge_crossings and edge_crossings[0].distance < best.distance * (1 - SAME_DISTANCE):
         best = EdgePoint(edge_crossings[0].u, False)
-    if not best.u.size or not is_boundary(base, best.u, heavy):
+    if not best.u.size or not is_boundary(base, best.u, is_damping):
         return Nearest(kind)
-    direct = not find_crossings_on_segment(base, best.u, heavy)
+    direct = not find_crossings_on_segment(base, best.u, is_damping)
     direction = Table(dict(zip(base.weights, best.u.tolist(), strict=True)))
-    parameters = {
-        n: 0.0 if abs(x) <= _NOTHING * base.weights.get(n, 0.0) else x for n, x in base.design(best.u).items()
-    }
+    parameters = {n: 0.0 if abs(x) <= _ZERO * base.weights.get(n, 0.0) else x for n, x in base.design(best.u).items()}
     return Nearest(kind, best.distance, Table(parameters), direction, best.refined, direct)
 
 
 def _find_nearest_on_edge(
     base: WeightedDesign, edge: Edge, sign: float, starts: list[Array], method: Method
 ) -> EdgePoint:
-    """The nearest end of runs from all starts; crossings on the segment to it are the starts of the next round."""
+    """Run from all starts and keep the nearest end; the crossings on the segment to it start the next round."""
     best = EdgePoint()
     size = min((float(np.linalg.norm(u)) for u in starts if u.any()), default=1.0)
-    run = make_approach(base, edge, sign, size, method)
+    run = make_edge_search(base, edge, sign, size, method)
     for round_number in range(_ROUNDS):
         last_distance = best.distance
         for u in starts:
             best = run(u, best)
         if not best.u.size:
             break
-        crossings = find_crossings_on_segment(base, best.u, edge.real)
+        crossings = find_crossings_on_segment(base, best.u, edge.is_real)
         starts = [c.u for c in crossings if (c.edge, c.sign) == (edge.name, sign)]
         if (
             edge.name == "real" and best.distance < last_distance

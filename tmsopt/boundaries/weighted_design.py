@@ -15,13 +15,13 @@ from tmsopt.problem.quantities import STRUCTURE_TOLERANCE
 from tmsopt.records import Array, Numbers
 from tmsopt.roots import is_stable, multiple_real_roots, real_roots
 
-_NOTHING = 1e-12  # a value smaller than this part of the range of a free parameter counts as 0
-_OPEN = 1e-6  # smallest distance from an end that a range excludes, relative to the size of the parameter
+_ZERO = 1e-12  # relative to the range of a free parameter: a smaller value counts as 0
+_INSET = 1e-6  # relative to the size of a parameter: smallest distance from an excluded end of its range
 
 
 @dataclass(frozen=True)
 class WeightedDesign:
-    """A design and the changes of its parameters that are considered.
+    """A design with the weights of the parameters that may change.
 
     A displacement u gives the change of each parameter in units of its weight.
 
@@ -35,7 +35,7 @@ class WeightedDesign:
     weights: Numbers
 
     def displace(self, u: Any) -> dict[str, Any]:
-        """Every parameter for displacements: one number, array or symbol per weight."""
+        """Return every parameter after displacements: u has one number, array or symbol per weight."""
         displaced = {n: self.parameters[n] + weight * u[k] for k, (n, weight) in enumerate(self.weights.items())}
         return {**self.parameters, **displaced}
 
@@ -43,10 +43,12 @@ class WeightedDesign:
         """The parameters at a displacement, inside their ranges; a displacement to an end gives exactly the end."""
         parameters = self.displace(u)
         for k, n in enumerate(self.weights):
-            r = self.problem.parameter_set[n].range
-            parameters[n] = min(max(float(parameters[n]), r.lower), r.upper)
-            parameters[n] = r.lower if u[k] <= self.lower[k] and r.closed else parameters[n]
-            parameters[n] = r.upper if u[k] >= self.upper[k] and r.closed else parameters[n]
+            physical_range = self.problem.parameter_set[n].range
+            parameters[n] = min(max(float(parameters[n]), physical_range.lower), physical_range.upper)
+            if physical_range.closed and u[k] <= self.lower[k]:
+                parameters[n] = physical_range.lower
+            if physical_range.closed and u[k] >= self.upper[k]:
+                parameters[n] = physical_range.upper
         return parameters
 
     @cached_property
@@ -65,7 +67,7 @@ class WeightedDesign:
         displacements = []
         for n, weight in self.weights.items():
             physical_range, value = self.problem.parameter_set[n].range, self.parameters[n]
-            inset = 0.0 if physical_range.closed else _OPEN * abs(value)
+            inset = 0.0 if physical_range.closed else _INSET * abs(value)
             ends = (physical_range.lower + inset - value) / weight, (physical_range.upper - inset - value) / weight
             displacements.append((min(ends[0], 0.0), max(ends[1], 0.0)))
         return np.array(displacements)
@@ -84,7 +86,7 @@ class WeightedDesign:
             return np.stack(np.broadcast_arrays(*a, u[..., 0])[:-1], axis=-1) / self.scale
 
     @cached_property
-    def stable(self) -> bool:
+    def is_stable(self) -> bool:
         """Whether all roots are left of the imaginary axis."""
         return bool(is_stable(self._scaled_coefficients))
 
@@ -94,7 +96,7 @@ class WeightedDesign:
         return edges_at(self.problem, self.parameters)
 
     @cached_property
-    def heavily_damped(self) -> bool:
+    def is_heavily_damped(self) -> bool:
         """Whether all roots are real and negative, multiple ones included."""
         c = self._scaled_coefficients
         return self.is_on_damping_edge or bool(c[0] != 0 and real_roots(c)[0] == len(c) - 1)
@@ -103,14 +105,14 @@ class WeightedDesign:
     def is_on_damping_edge(self) -> bool:
         """Whether all roots are real and negative and two are equal, decided by coefficients."""
         c = self._scaled_coefficients
-        if c[0] == 0 or not self.stable:
+        if c[0] == 0 or not self.is_stable:
             return False
-        real = multiple_real_roots(c, STRUCTURE_TOLERANCE)
-        return real is not None and all(r.re < 0 for r in real)
+        roots = multiple_real_roots(c, STRUCTURE_TOLERANCE)
+        return roots is not None and all(root.re < 0 for root in roots)
 
     @cached_property
     def sizes(self) -> Array:
-        """Size of the terms of each coefficient, by which equations between coefficients are judged."""
+        """Size of the terms of each coefficient: the unit in which equations between coefficients must hold."""
         c = self._scaled_coefficients
         return measure_terms(c) if c.any() else np.ones(len(c))
 
@@ -148,11 +150,11 @@ def weight_design(problem: Posed, parameters: Numbers, weights: Numbers | None) 
 
 
 def default_weights(problem: Posed, parameters: Numbers) -> dict[str, float]:
-    """The |value| of each parameter that may change; instead of 0 the largest |value| of the same unit, or else 1."""
+    """The |value| of each parameter that may change; for a value 0, the largest |value| of the same unit, or else 1."""
     parameter_set = problem.parameter_set
     weights = {}
     widths = {n: high - low for n, (low, high) in problem.free.items()}
-    sizes = {n: abs(x) if abs(x) > _NOTHING * widths.get(n, 0.0) else 0.0 for n, x in parameters.items()}
+    sizes = {n: abs(x) if abs(x) > _ZERO * widths.get(n, 0.0) else 0.0 for n, x in parameters.items()}
     for p in (p for p in parameter_set.parameters if p.may_change(sizes[p.name])):
         peers = [sizes[q.name] for q in parameter_set.parameters if q.unit == p.unit and p.unit not in ("1", "rad")]
         weights[p.name] = sizes[p.name] or max(peers, default=0.0) or 1.0

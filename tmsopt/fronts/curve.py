@@ -15,7 +15,7 @@ from tmsopt.fronts.front import Front, FrontPoint, Gap, Kink, efficient_points
 from tmsopt.fronts.subproblems import MAX_PARALLEL, FrontSolver, front_point, map_items, minimise_limited
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Steps
-from tmsopt.search.solve import add_cover
+from tmsopt.search.solve import add_worst_case_proof
 
 Objectives = tuple[float, ...]
 
@@ -352,7 +352,7 @@ def _assemble_front(search: _Search, front: Front) -> Front:
 
 
 def _add_cover(_: FrontSolver, solution: Solution) -> Solution:
-    return add_cover(solution)
+    return add_worst_case_proof(solution)
 
 
 def _describe_gap(solver: FrontSolver, s: _Stretch) -> str:

@@ -1,7 +1,7 @@
-"""Searches of a whole box: does any design reach a limit (SCIP), are these all designs with a pattern (intervals).
+"""Searches of a whole box: SCIP decides whether any design reaches a limit, intervals find all designs with a pattern.
 
-In: a `Question`, or a problem with as many conditions as free parameters. Out: an `Answer`, or a `Completeness` with
-every design. Open `question` first, then `completeness`; `race` runs SCIP in separate processes.
+The input is a `Question`, or a problem with as many conditions as free parameters. The result is an `Answer`, or a
+`Completeness` with every design. Open `question` first, then `completeness`; `race` runs SCIP in separate processes.
 """
 
 import lazy_loader

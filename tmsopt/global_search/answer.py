@@ -18,20 +18,20 @@ from tmsopt.program.formulate import design_of, variables_of
 from tmsopt.program.starts import initial_point
 from tmsopt.progress import Counts
 
-_ROW_TOLERANCE = 1e-6  # relative to a row's range: SCIP meets a row to 1e-9, but multiple roots have half the digits
+_ROW_TOLERANCE = 1e-6  # relative to the range of a row: SCIP meets a row to 1e-9, but multiple roots lose digits
 _HALF_WIDTH = 1e-4  # half the width of the box around a known design, relative to the range of each variable
-_MIN_RANGE = 1e-2  # relative to 1 + |x|: shorter ranges count as this long, since SCIP cannot resolve less
+_MIN_RANGE = 1e-2  # relative to 1 + |x|: a shorter range counts as this long, since SCIP cannot resolve less
 _SHORT_SECONDS = 1.0  # time limit for a bound on a0, and for the box around a known design
 _FIRST_SECONDS = 2.0  # time limit of the first turn; each turn doubles it
 _TURNS = (((1.0, False), (1.0, True)), ((4.0, False), (0.25, False)), ((16.0, False), (4.0, True)))
-"""Formulations that race in each turn: (factor on the unit of the roots, compact)."""
+"""Formulations that run in parallel in each turn: (factor on the unit of the roots, value of `Question.compact`)."""
 
 
 class Clock:
     """Counts the time and the search nodes that a proof has used.
 
     Attributes:
-        note: the state of the proof, shown as progress.
+        note: what the proof has reached, in words; shown as progress.
     """
 
     def __init__(self, seconds: float, pool: SolverPool, progress: Counts | None = None) -> None:
@@ -47,11 +47,11 @@ class Clock:
 
     @property
     def seconds_left(self) -> float:
-        """Seconds left; 0 after an interruption."""
+        """Seconds left before the time limit; 0 after an interruption."""
         return 0.0 if self.interrupted else max(self.seconds - self.seconds_used, 0.0)
 
     def race(self, tasks: Sequence[Task]) -> list[Decision]:
-        """Decide tasks in parallel; the first infeasible one stops the others, Ctrl-C leaves all undecided."""
+        """Decide tasks in parallel. The first infeasible task stops the others; Ctrl-C leaves all tasks undecided."""
         try:
             decisions = self.pool.race(tasks, self.report_progress)
         except KeyboardInterrupt:
@@ -72,77 +72,78 @@ class Answer:
 
     Attributes:
         verdict: ``infeasible`` (no such design), ``found`` or ``undecided``.
-        better: the optimum reached from the point that the solver found.
-        point: that point, if it is feasible and better but no optimum was reached from it.
+        better_solution: the optimum reached from the point that the solver found.
+        point: the free parameters at that point, if they were accepted without a search for an optimum.
     """
 
     verdict: str
-    better: Solution | None = None
+    better_solution: Solution | None = None
     point: Mapping[str, float] | None = None
 
 
 PointCheck = Callable[[Mapping[str, float]], Answer]
-"""Judges a point that the solver found."""
+"""Free parameters at a point that the solver found → the answer that they give."""
 
 
-def answer_question(question: Question, clock: Clock, share: float, confirm: PointCheck) -> Answer:
+def answer_question(question: Question, clock: Clock, time_share: float, confirm: PointCheck) -> Answer:
     """Answer a question for each sign of a0 in turn, within a share of the time left.
 
     The time of branch and bound varies strongly with the formulation. Each turn races two formulations, and each turn
     lasts longer than the one before.
 
     Args:
-        confirm: judges a point that the solver found; ``undecided`` if the point is feasible only within the solver's
-            tolerance.
+        confirm: checks a point that the solver found; its answer is ``undecided`` if the point is feasible only within
+            the solver's tolerance.
 
     Raises:
         UnsupportedOperation: for an operation that the solver does not support.
     """
-    end = clock.seconds_used + share * clock.seconds_left
+    end_time = clock.seconds_used + time_share * clock.seconds_left
     for sign in question.possible_signs():
-        reply = _answer_for_sign(question, sign, clock, end, confirm)
-        if reply.verdict != INFEASIBLE:
-            return reply
+        answer = _answer_for_sign(question, sign, clock, end_time, confirm)
+        if answer.verdict != INFEASIBLE:
+            return answer
     return Answer(INFEASIBLE)
 
 
-def _answer_for_sign(question: Question, sign: int, clock: Clock, end: float, confirm: PointCheck) -> Answer:
-    """Answer a question for one sign of a0."""
+def _answer_for_sign(question: Question, sign: int, clock: Clock, end_time: float, confirm: PointCheck) -> Answer:
+    """Answer a question for one sign of a0; `end_time` is in seconds of the clock."""
     least_lead = 0.0
     if (leading := question.leading_program(sign)) is not None:
-        least_lead = clock.race([make_task(leading, min(_SHORT_SECONDS, end - clock.seconds_used), minimise=True)])[
-            0
-        ].bound
-        if least_lead == math.inf:  # the constraints alone are infeasible
+        least_lead = clock.race(
+            [make_task(leading, min(_SHORT_SECONDS, end_time - clock.seconds_used), minimise=True)]
+        )[0].bound
+        if least_lead == math.inf:  # the constraints exclude every design
             return Answer(INFEASIBLE)
     for turn in count():
-        seconds_left = min(end - clock.seconds_used, clock.seconds_left)
+        seconds_left = min(end_time - clock.seconds_used, clock.seconds_left)
         if seconds_left <= 0:
             return Answer(UNDECIDED)
         seconds = min(
             seconds_left, _FIRST_SECONDS * 2.0 ** min(turn, 30)
         )  # a solver that gives up at once takes many turns
-        variants = [replace(question, unit=question.unit * u, compact=c) for u, c in _TURNS[turn % len(_TURNS)]]
+        turn_formulations = _TURNS[turn % len(_TURNS)]
+        variants = [replace(question, unit=question.unit * k, compact=compact) for k, compact in turn_formulations]
         try:
             decisions = clock.race([make_task(v.program(sign, max(least_lead, 0.0)), seconds) for v in variants])
         except UnsupportedOperation:
             if turn == 0:
                 raise
-            continue  # only these units make some number too large or too small
+            continue  # these units make a number too large or too small; others may not
         if any(decision.verdict == INFEASIBLE for decision in decisions):
             return Answer(INFEASIBLE)
         for decision in decisions:
             if decision.point is not None:
-                reply = confirm(design_of(question.problem, decision.point.tolist()))
-                if reply.verdict == FOUND:
-                    return reply
-    raise AssertionError  # unreachable: time ends
+                answer = confirm(design_of(question.problem, decision.point.tolist()))
+                if answer.verdict == FOUND:
+                    return answer
+    raise AssertionError  # unreachable, because the time ends
 
 
 def find_exclusion(question: Question, design: Mapping[str, float]) -> str:
     """Say why a question excludes a design that it must admit; empty if it admits the design.
 
-    A question with a wrong limit, range or equation excludes the known design, and then its answer proves nothing.
+    If a question has a wrong limit, range or equation, it excludes the known design, and its answer proves nothing.
     """
     excesses: list[tuple[float, str]] = []
     for sign in question.possible_signs():
@@ -150,11 +151,10 @@ def find_exclusion(question: Question, design: Mapping[str, float]) -> str:
         x = initial_point(nlp, question.problem, design)
         rows = nlp.evaluate(x)[1]
         _, *row_ranges = ranges(nlp.numeric_formula, list(zip(nlp.lower, nlp.upper, strict=True)))
-        sizes = np.array([max(map(abs, ends)) for ends in row_ranges])
-        sizes = np.where(np.isfinite(sizes), np.maximum(sizes, 1e-300), 1.0)
-        row_excesses = np.maximum(np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper)) / sizes
-        span = np.maximum(1.0, np.abs(x))
-        variable_excesses = np.maximum(np.array(nlp.lower) - x, x - np.array(nlp.upper)) / span
+        row_sizes = np.array([max(map(abs, ends)) for ends in row_ranges])
+        row_sizes = np.where(np.isfinite(row_sizes), np.maximum(row_sizes, 1e-300), 1.0)
+        row_excesses = np.maximum(np.array(nlp.row_lower) - rows, rows - np.array(nlp.row_upper)) / row_sizes
+        variable_excesses = np.maximum(np.array(nlp.lower) - x, x - np.array(nlp.upper)) / np.maximum(1.0, np.abs(x))
         named_excesses = [
             *zip(row_excesses.tolist(), nlp.rows, strict=True),
             *zip(variable_excesses.tolist(), nlp.variables, strict=True),
@@ -167,9 +167,9 @@ def find_exclusion(question: Question, design: Mapping[str, float]) -> str:
 
 
 def is_excluded_by_solver(question: Question, design: Mapping[str, float], clock: Clock) -> bool:
-    """Whether the solver calls a small box around a feasible design infeasible; if so, its answers prove nothing.
+    """Whether the solver finds a small box around a feasible design infeasible; then its answers prove nothing.
 
-    `find_exclusion` checks the equations; this checks the solver's own model of them, with its ranges and tolerances.
+    `find_exclusion` checks the equations. This function checks the solver's model of them, with ranges and tolerances.
     """
     point = variables_of(question.problem, design)
     verdicts = []

@@ -40,13 +40,15 @@ SECONDS = 60.0
 _SINGULAR = "the equations are (nearly) singular there: the design is one of a continuum, or two designs meet"
 _TIME_OUT = "time limit reached"
 _STOPPED = "interrupted"
-_UNIT_FACTOR = (
-    1.375  # multiplies the usual unit of the roots; roots are often at 1, where small and large ones would meet
-)
-_WORK_DIGITS, _ZERO_DIGITS, _RESULT_DIGITS = 60, 40, 25  # decimal digits of the arithmetic, of a zero, of a design
+# Multiplies the usual unit of the roots: many roots have the size 1, which separates small roots from large ones.
+_UNIT_FACTOR = 1.375
+_WORK_DIGITS = 60  # decimal digits of the arithmetic
+_ZERO_DIGITS = 40  # decimal digits of a zero
+_RESULT_DIGITS = 25  # decimal digits of a design
 _BATCH = 1024  # boxes per turn, so that a turn takes about 0.1 s
-_MIN_WIDTH, _MAX_MIN_WIDTH = 1e-7, 1e-2  # least width to split, relative to the first box; grows from first to second
-_SMALL_BOXES = 400  # more small boxes than these hold no isolated designs; the least width then grows tenfold
+_MIN_WIDTH = 1e-7  # relative to the first box: narrower boxes are not split
+_MAX_MIN_WIDTH = 1e-2  # if the least width has grown beyond this, the search stops
+_MAX_SMALL_BOXES = 400  # more small boxes show a continuum of designs; the least width then grows tenfold
 _MAX_PLACES = 12  # more undecided places are merged into one
 
 
@@ -71,7 +73,8 @@ class Completeness:
         complete: whether it is proved that the box holds `designs` and no others.
         reason: why it is not proved.
         designs: free parameters of each proved design, angles in radians.
-        limits: for each design, the limit on which it lies to all digits computed (it may lie just beyond), or empty.
+        limits: for each design, the limit that it reaches in all digits computed, or empty; the exact design may
+            violate this limit slightly.
         boxes: number of boxes that branch and prune handled.
         seconds: time used.
         undecided: the undecided parts of the box.
@@ -96,8 +99,8 @@ def prove_completeness(problem: Posed, seconds: float = SECONDS, progress: Count
     """Find all designs of a box with the pattern of a problem, and prove that there are no others.
 
     Boxes in the parameters and the unknowns of the pattern are contracted and split until interval arithmetic shows
-    that they hold no design, or Krawczyk's test shows that a box around them holds exactly one. Floats stand for the
-    shortest decimals that print them. Ctrl-C ends the proof and keeps what is proved.
+    that they hold no design, or Krawczyk's test shows that a box around them holds exactly one. A float stands for the
+    shortest decimal that prints it. Ctrl-C ends the proof and keeps what is proved.
 
     Args:
         problem: with a pattern, and as many conditions as free parameters.
@@ -130,13 +133,20 @@ class _Zero:
 
 @dataclass
 class _ZeroSearch:
-    """The state of a search over all systems of a pattern."""
+    """The state of a search over all systems of a pattern.
 
-    end: float
+    Attributes:
+        end_time: value of the clock at which the time is over.
+        seconds: the time limit.
+        stop_reason: why the search stopped early; empty if it did not.
+        undecided: (box, reason) for each undecided part.
+    """
+
+    end_time: float
     seconds: float
     progress: Counts | None
-    boxes: int = 0
-    stopped: str = ""
+    box_count: int = 0
+    stop_reason: str = ""
     zeros: list[_Zero] = field(default_factory=list)
     undecided: list[tuple[Box, str]] = field(default_factory=list)
 
@@ -145,10 +155,10 @@ class _ZeroSearch:
         zeros: list[_Zero] = []
         whole_box = np.array(first_box).T[..., None]
         boxes, small_boxes = whole_box, whole_box[..., :0]
-        max_small, min_width = _SMALL_BOXES, _MIN_WIDTH
+        max_small, min_width = _MAX_SMALL_BOXES, _MIN_WIDTH
         try:
             while boxes.shape[-1] and min_width <= _MAX_MIN_WIDTH and not self.must_stop():
-                self.boxes += boxes[..., -_BATCH:].shape[-1]
+                self.box_count += boxes[..., -_BATCH:].shape[-1]
                 pruned = prune(conditions, boxes[..., -_BATCH:], min_width)
                 boxes = np.concatenate([boxes[..., :-_BATCH], pruned.remaining], axis=-1)
                 is_unproved = [
@@ -156,28 +166,30 @@ class _ZeroSearch:
                 ]
                 small_boxes = np.concatenate([small_boxes, pruned.small, pruned.proved[0][..., is_unproved]], axis=-1)
                 if small_boxes.shape[-1] >= max_small:
-                    max_small, min_width = max_small + _SMALL_BOXES, 10 * min_width
+                    max_small, min_width = max_small + _MAX_SMALL_BOXES, 10 * min_width
         except KeyboardInterrupt:
-            self.stopped, boxes = _STOPPED, whole_box  # the current batch may be lost
+            self.stop_reason, boxes = _STOPPED, whole_box  # the current batch may be lost
         self.zeros += zeros
         self.undecided += [(_as_box(box), _SINGULAR) for box in np.moveaxis(small_boxes, -1, 0)]
-        self.undecided += [(_as_box(box), self.stopped or _SINGULAR) for box in np.moveaxis(boxes, -1, 0)]
+        self.undecided += [(_as_box(box), self.stop_reason or _SINGULAR) for box in np.moveaxis(boxes, -1, 0)]
 
     def must_stop(self) -> bool:
         """Whether the search was stopped or its time is over; reports progress."""
-        seconds_left = self.end - time.perf_counter()
+        seconds_left = self.end_time - time.perf_counter()
         if self.progress:
-            self.progress(min(self.seconds - seconds_left, self.seconds), self.seconds, f"{self.boxes:,} boxes")
-        self.stopped = self.stopped or (_TIME_OUT if seconds_left <= 0 else "")
-        return bool(self.stopped)
+            self.progress(min(self.seconds - seconds_left, self.seconds), self.seconds, f"{self.box_count:,} boxes")
+        self.stop_reason = self.stop_reason or (_TIME_OUT if seconds_left <= 0 else "")
+        return bool(self.stop_reason)
 
     def summarise(self, problem: Posed, seconds: float) -> Completeness:
         """Collect the proved designs and the undecided places."""
         designs: list[tuple[Mapping[str, Any], str]] = []
         for zero in self.zeros:
             parameters = {n: zero.enclosure.balls[n] for n in problem.free}
-            limit = _active_limits(zero)
-            if limit is not None and not any(all(parameters[n].overlaps(b[n]) for n in parameters) for b, _ in designs):
+            limit = _name_active_limits(zero)
+            if limit is not None and not any(
+                all(parameters[n].overlaps(other[n]) for n in parameters) for other, _ in designs
+            ):
                 designs.append((parameters, limit))
         designs.sort(key=lambda pair: [float(x) for x in pair[0].values()])
         parameter_set = problem.parameter_set
@@ -189,19 +201,19 @@ class _ZeroSearch:
         undecided = tuple(Undecided(_parameter_ranges(problem, box), reason) for box, reason in places)
         reasons = dict.fromkeys(u.reason for u in undecided)
         return Completeness(
-            complete=not (self.undecided or self.stopped),
-            reason="; ".join(reasons) or self.stopped,
+            complete=not (self.undecided or self.stop_reason),
+            reason="; ".join(reasons) or self.stop_reason,
             designs=tuple(map(Table, numbers)),
             limits=tuple(limit for _, limit in designs),
-            boxes=self.boxes,
+            boxes=self.box_count,
             seconds=seconds,
             undecided=undecided,
-            stopped=self.stopped == _STOPPED,
+            stopped=self.stop_reason == _STOPPED,
         )
 
 
 def _add_zero(zeros: list[_Zero], system: PatternSystem, wide_box: Box, image_box: Box) -> bool:
-    """Prove the only zero of a box by ball arithmetic and add it to `zeros` if it is new; False if the proof fails."""
+    """Prove by ball arithmetic that a box has one zero; add it to `zeros` if it is new. False if the proof fails."""
     if any(_is_inside(image_box, proved_zero.unique_box) for proved_zero in zeros):
         return True
     zero = _prove_zero(system, image_box)
@@ -214,13 +226,13 @@ def _add_zero(zeros: list[_Zero], system: PatternSystem, wide_box: Box, image_bo
 
 
 def _enumerate_systems(problem: Posed) -> Iterator[PatternSystem]:
-    """One system for each choice of small and large roots."""
+    """Yield one system for each choice of small and large roots."""
     assert problem.pattern is not None
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
     middle = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}
     lifted = lifted_quantities(problem.model, problem.parameter_set, problem.ordered(middle), equalities)
     frame, scale = find_rotating_frame(problem), scale_of(problem)
-    for pieces in enumerate_pieces(problem.pattern.form, complex_h=frame is not None):
+    for pieces in enumerate_pieces(problem.pattern.form, is_complex=frame is not None):
         yield build_system(problem, pieces, frame or Scale(_UNIT_FACTOR * scale.unit, scale.lead), lifted)
 
 
@@ -243,7 +255,7 @@ def _build_conditions(system: PatternSystem) -> tuple[BoxConditions, Box]:
 
 
 def _unknown_ranges(system: PatternSystem) -> list[tuple[Any, Any]]:
-    """Least and greatest value of each unknown, as balls."""
+    """Return the least and the greatest value of each unknown, as balls."""
     problem = system.problem
     ranges: list[tuple[Any, Any]] = []
     for name, ends in problem.free.items():
@@ -280,33 +292,36 @@ def _is_inside(box: Sequence[tuple[Any, Any]], outer_box: Box) -> bool:
     return all(lo > low and hi < high for (lo, hi), (low, high) in zip(box, outer_box, strict=True))
 
 
-def _active_limits(zero: _Zero) -> str | None:
-    """Name the limits on which a design lies to all digits computed, or empty; None if it violates a limit."""
-    system, at = zero.system, zero.enclosure.balls
+def _name_active_limits(zero: _Zero) -> str | None:
+    """Name the limits that a design reaches in all digits computed; empty if none, None if it violates a limit."""
+    system, balls = zero.system, zero.enclosure.balls
     margins: list[tuple[str, Any]] = []
     for name, (lo, hi) in zip(system.names, _unknown_ranges(system), strict=True):
         label = "" if name.startswith(":") else name
-        margins += [(label and f"the least {label}", at[name] - lo), (label and f"the greatest {label}", hi - at[name])]
-    margins += [("the edge of the pattern", x) for x in fold(system.nonnegative, at, BALLS)]
-    margins += [("", x) for x in fold(system.ascending, at, BALLS)]
+        margins += [
+            (label and f"the least {label}", balls[name] - lo),
+            (label and f"the greatest {label}", hi - balls[name]),
+        ]
+    margins += [("the edge of the pattern", x) for x in fold(system.nonnegative, balls, BALLS)]
+    margins += [("", x) for x in fold(system.ascending, balls, BALLS)]
     for name, condition in system.problem.conditions.items():
         if not condition.equality:
             excess = condition.sign * flint.arb(
-                fold(system.limits[name], at, BALLS)[0] if name in system.limits else "nan"
+                fold(system.limits[name], balls, BALLS)[0] if name in system.limits else "nan"
             )
             if not excess.is_finite():  # undefined somewhere in the ball: check the middle
-                middle = system.problem.ordered({n: float(at[n].mid()) for n in system.problem.free})
+                middle = system.problem.ordered({n: float(balls[n].mid()) for n in system.problem.free})
                 if not condition.violation(system.problem.values(middle)) <= 0:
                     return None
             margins.append((f"constraint {name}", -excess))
     if any(x < 0 for _, x in margins):
         return None
     active_limits = [label for label, x in margins if label and not x > 0]
-    return ", ".join(active_limits + ["a0 = 0"] * flint.arb(fold(system.leading, at, BALLS)[0]).contains(0))
+    return ", ".join(active_limits + ["a0 = 0"] * flint.arb(fold(system.leading, balls, BALLS)[0]).contains(0))
 
 
 def _merge_undecided(problem: Posed, undecided: Iterable[tuple[Box, str]]) -> list[tuple[Box, str]]:
-    """Merge boxes that touch into their hulls, in the free parameters; into one hull if there are many."""
+    """Merge boxes that touch into one hull, in the free parameters; if many hulls remain, merge all of them."""
     places: list[tuple[Box, str]] = []
     for box, reason in undecided:
         hull, separate_places = box[: len(problem.free)], []

@@ -33,7 +33,7 @@ class Frame:
     Attributes:
         signs: case → sign of its leading coefficient; cases without a sign are left out.
         unit: typical size of the roots, a power of two.
-        needs_contact: whether a root must lie on the vertical line; needed if the problem rewards a larger abscissa.
+        needs_contact: whether a root must lie on the vertical line; this is so if a larger abscissa can be better.
         compact: whether squared frequencies are written as X/(1 − X).
         least_lead: lower bound on the size of the model's leading coefficient in the first case.
     """
@@ -48,38 +48,38 @@ class Frame:
     def coefficients(self, values: Sequence[Values], case: int) -> list[Any]:
         """Coefficients of a case, for roots measured in `unit`; the leading one is positive."""
         a = compact_coefficients(self.model, values[case])
-        return [self.signs[case] * c * self.lead / self.unit**k for k, c in enumerate(a)]
+        return [self.signs[case] * c * self.common_factor / self.unit**k for k, c in enumerate(a)]
 
     @property
-    def lead(self) -> float:
-        """Common factor of all coefficients, so that neither the first nor the last ones become tiny."""
+    def common_factor(self) -> float:
+        """Factor on all coefficients, so that neither the first nor the last ones become tiny."""
         return float(self.unit ** (self.model.degree // 2)) if self.model.degree > _UNSCALED_DEGREE else 1.0
 
     def shifted_coefficients(self, values: Sequence[Values], case: int, line: Any) -> list[Any]:
         """The coefficients of p(t + line)."""
         return shift(self.coefficients(values, case), line / self.unit)
 
-    def bound_roots(self, ranges: Sequence[Interval], first: bool) -> float:
-        """Bound on the roots for coefficients in ranges; `first` marks the first case."""
+    def bound_roots(self, ranges: Sequence[Interval], is_first_case: bool) -> float:
+        """Bound on the sizes of the roots for coefficients in these ranges."""
         (lower, upper), *other_ranges = ranges
-        least = self.least_lead * self.lead if first else -math.inf
-        return bound_roots([(max(lower, least), max(upper, least)), *other_ranges])
+        least_lead = self.least_lead * self.common_factor if is_first_case else -math.inf
+        return bound_roots([(max(lower, least_lead), max(upper, least_lead)), *other_ranges])
 
 
 def compact_coefficients(model: Model, values: Values) -> list[Any]:
     """Coefficients up to a common positive factor, in the shortest form that the model has."""
-    with suppress(ZeroDivisionError):  # a parameter is fixed at 0
+    with suppress(ZeroDivisionError):  # the short form divides by a parameter that is fixed at 0
         if model.compact is not None:
             return model.compact(**model.algebraic({name: values[name] for name in model.sets[0].names}))
     return list(values.coefficients)
 
 
 def add_half_planes(frame: Frame, build: Builder, line: float | None = None) -> LiftedQuantity:
-    """Require all roots of all cases at or left of a line; None makes the line a variable."""
+    """Require that all roots of all cases lie on or left of the line Re s = `line`; None makes the line a variable."""
     first_index, covered_cases, values = len(build.x), build.covered_cases, build.values
     cases = [case for case in covered_cases if case in frame.signs]
     line_position: Any = line
-    if line is None:  # the line is at most at the largest root, unless a case without a sign has that root
+    if line is None:  # the line is not right of the largest root, unless a case without a sign has that root
         largest_root = frame.unit * max(
             frame.bound_roots(build.enclose(frame.coefficients(values, case)), case == cases[0]) for case in cases
         )
@@ -98,7 +98,7 @@ def add_half_planes(frame: Frame, build: Builder, line: float | None = None) -> 
 
 
 def add_sectors(frame: Frame, build: Builder, ratio: float | None = None) -> LiftedQuantity:
-    """Require a damping ratio of all roots of all cases: p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ.
+    """Require a damping ratio ζ for all roots of all cases: p = a0 ∏ (s² + pᵢ s + wᵢ²), wᵢ ≥ 0, pᵢ ≥ 2 ζ wᵢ.
 
     A root s > 0 has ζ = −1 and, together with a root s < 0, no such factor. If ζ may be −1, the factors are
     s² + pᵢ s + qᵢ, and qᵢ = wᵢ² is required for other ζ only: (1 + ζ)(wᵢ² − qᵢ) = 0. A fixed ζ = −1 requires nothing.
@@ -147,7 +147,7 @@ def add_sectors(frame: Frame, build: Builder, ratio: float | None = None) -> Lif
 
 
 def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
-    """Bound the coefficients of the factors of a pattern, the last variables: by C(m, k) R^k for degree m."""
+    """Bound the unknowns of a pattern, which are the last variables: C(m, k) R^k for coefficient k of a degree m."""
     count = len(pattern.unknowns)
     root_bound = bound_roots(build.enclose(compact_coefficients(frame.model, build.values[0]))) / build.scale.unit
     symbols = build.x[-count:]
@@ -161,24 +161,24 @@ def bound_unknowns(frame: Frame, build: Builder, pattern: Pattern) -> None:
 
 
 def _guess_half_planes(
-    frame: Frame, covered: Sequence[int], line: float | None, values: Sequence[Values], z: Sequence[Roots]
+    frame: Frame, cases: Sequence[int], line: float | None, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
-    """Start values: the leftmost line, unless it is fixed, and the squared frequencies."""
-    line_position = max(float(values[case]["abscissa"]) for case in covered) if line is None else line
+    """Return start values: the leftmost line, unless it is fixed, and the squared frequencies."""
+    line_position = max(float(values[case]["abscissa"]) for case in cases) if line is None else line
     squares = [
         x
-        for case in covered
+        for case in cases
         for x in squared_frequencies([float(c) for c in frame.shifted_coefficients(values, case, line_position)])
     ]
     return [[*([line_position] if line is None else []), *(x / (1 + x) if frame.compact else x for x in squares)]]
 
 
 def _guess_sectors(
-    frame: Frame, covered: Sequence[int], ratio: float | None, unit: float, values: Sequence[Values], z: Sequence[Roots]
+    frame: Frame, cases: Sequence[int], ratio: float | None, unit: float, values: Sequence[Values], z: Sequence[Roots]
 ) -> list[list[float]]:
-    """Start values: the damping ratio, unless it is fixed, and the factors; `z` is in the unit of the NLP."""
+    """Return start values: the damping ratio, unless it is fixed, and the factors; `z` is in the unit of the NLP."""
     factors = []
-    for case in covered:
+    for case in cases:
         root_groups = pair_roots(z[case] * unit / frame.unit)
         for p, q in sorted((float(-r.sum().real), float(r.prod().real)) for r in root_groups if len(r) == 2):
             is_unstable = q < 0 or (p < 0 and p * p >= 4 * q)  # a root s > 0
@@ -187,4 +187,4 @@ def _guess_sectors(
             factors += [d, abs(d)] if ratio is None else [d]
     if ratio is not None:
         return [factors]
-    return [[min(float(values[case]["damping_ratio"]) for case in covered), *factors]]
+    return [[min(float(values[case]["damping_ratio"]) for case in cases), *factors]]

@@ -19,7 +19,7 @@ from tmsopt.program.lifts import ProgramBuilder
 from tmsopt.roots import product
 
 Square = tuple[Any, Any]
-"""(x, y), both ≥ 0, stand for x/y; infinite for y = 0."""
+"""(x, y), both ≥ 0, stands for the number x/y, which is infinite for y = 0."""
 
 
 def frequency_count(degree: int) -> int:
@@ -28,17 +28,17 @@ def frequency_count(degree: int) -> int:
 
 
 def interlacing_conditions(coefficients: Sequence[Any], squares: Sequence[Square]) -> tuple[list[Any], list[Any]]:
-    """Expressions that are 0, and expressions that are ≥ 0, if all roots have Re t ≤ 0.
+    """Return expressions that are 0 and expressions that are ≥ 0 if all roots have Re t ≤ 0.
 
     Up to degree 4 the converse holds too.
 
     Args:
         coefficients: descending; the leading one is positive.
-        squares: x1 ≥ x2 ≥ … ≥ 0, squared frequencies at which the second part vanishes.
+        squares: squared frequencies x1 ≥ x2 ≥ … ≥ 0 at which the second part vanishes.
     """
     first, second = coefficients[0::2], coefficients[1::2]
-    expanded = product(*([y, x] for x, y in squares))
-    equations = [c * expanded[0] - second[0] * e for c, e in zip(second[1:], expanded[1:], strict=True)]
+    expanded_product = product(*([y, x] for x, y in squares))
+    equations = [c * expanded_product[0] - second[0] * e for c, e in zip(second[1:], expanded_product[1:], strict=True)]
     signs = [(-1) ** (j + 1) * _alternating_sum(first, *square) for j, square in enumerate(squares)]
     return equations, [*coefficients, *signs, *(x * v - u * y for (x, y), (u, v) in pairwise(squares))]
 
@@ -53,22 +53,22 @@ def _alternating_sum(part: Sequence[Any], x: Any, y: Any) -> Any:
 
 
 def add_interlacing(
-    build: ProgramBuilder, case: int, coefficients: Sequence[Any], largest: float, compact: bool
+    build: ProgramBuilder, case: int, coefficients: Sequence[Any], root_bound: float, compact: bool
 ) -> list[Any]:
     """Add variables and rows that keep all roots in Re t ≤ 0.
 
     Args:
-        largest: bound on the size of the roots.
-        compact: write the squares as X/(1 − X), which needs no bound on the roots.
+        root_bound: bound on the size of the roots.
+        compact: whether to write the squares as X/(1 − X), which needs no bound on the roots.
 
     Returns:
         Expressions ≥ 0; one of them can be 0 exactly if some root has Re t = 0.
     """
     degree = len(coefficients) - 1
     count = frequency_count(degree)
-    # The phase of p(iω) is least if all roots are at −R: degree · atan(ω/R), (degree − 2) π/2 at the last frequency.
-    reach = max(1.0, math.tan(math.pi / 2 - math.pi / degree)) if degree > 4 else 1.0
-    largest_square = 1.0 if compact else (largest * reach) ** 2
+    # The last frequency is highest if all roots are −R; there the phase degree · atan(ω/R) of p is (degree − 2) π/2.
+    max_ratio = max(1.0, math.tan(math.pi / 2 - math.pi / degree)) if degree > 4 else 1.0
+    largest_square = 1.0 if compact else (root_bound * max_ratio) ** 2
     unknown_squares = [build.add_variable(f"x{k}.{case}", 0.0, largest_square) for k in range(1, count + 1)]
     equations, nonnegative = interlacing_conditions(
         coefficients, [(x, 1 - x if compact else 1) for x in unknown_squares]
@@ -92,7 +92,7 @@ def squared_frequencies(coefficients: Sequence[float]) -> list[float]:
 
 
 def _candidate_squares(coefficients: Sequence[float]) -> Iterator[list[float]]:
-    """Yield the zeros of the second part; if it vanishes, values between the zeros of the first part; and all zeros."""
+    """Yield the zeros of the second part; if it vanishes, values between the zeros of the first part; and 0 for all."""
     count = frequency_count(len(coefficients) - 1)
     for part in (coefficients[1::2], coefficients[0::2]):
         alternating = np.array([c if k % 2 == 0 else -c for k, c in enumerate(part)])

@@ -1,8 +1,8 @@
 """The equations of a pattern in the parameters and a few bounded unknowns, so that no solution lies at infinity.
 
 Only the roots that the pattern ties together are unknowns; division of p by their factors eliminates the others. A root
-s with |s| ≤ 1 unit is an unknown itself, a larger one enters as 1/s in the reversed polynomial. So each unknown has a
-range for any leading coefficient, and no equation has a quotient.
+s with |s| ≤ 1 unit is an unknown itself; for a larger root, 1/s is an unknown, as a root of the reversed polynomial. So
+each unknown has a finite range, whatever the leading coefficient, and no equation has a quotient.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,7 +21,7 @@ from tmsopt.models.expression import Expression
 from tmsopt.models.stated.pairs import Pair
 from tmsopt.problem.problem import Posed
 from tmsopt.program.nlp import Scale
-from tmsopt.roots import product as multiplied
+from tmsopt.roots import product as polynomial_product
 from tmsopt.roots.patterns.components import Component, parse_components
 from tmsopt.roots.polynomial import characteristic_polynomial
 
@@ -39,18 +39,18 @@ class Piece:
         kind: ``root``, ``pair``, ``meeting`` (two real roots), ``axis`` or ``zero``; for a complex H ``point``, or
             ``line`` for a root on the imaginary axis.
         order: the power.
-        outer: whether its roots are large, so that the factor is a polynomial in 1/s.
-        first_index: index of its first unknown.
+        is_outer: whether its roots are large, so that the factor is a polynomial in 1/s.
+        first_index: index of its first unknown among all unknowns.
     """
 
     kind: str
     order: int
-    outer: bool
+    is_outer: bool
     first_index: int
 
     @property
     def ranges(self) -> tuple[Ends, ...]:
-        """Range of each unknown, since no root s (or 1/s) is larger than 1."""
+        """Range of each unknown; no root s (or 1/s) is larger than 1."""
         return {
             "root": ((-1.0, 1.0),),
             "pair": ((-2.0, 2.0), (0.0, 1.0)),
@@ -62,7 +62,7 @@ class Piece:
         }[self.kind]
 
     def own_unknowns(self, unknowns: Sequence[Any]) -> Sequence[Any]:
-        """Its unknowns among all unknowns."""
+        """The unknowns of this piece among all unknowns."""
         return unknowns[self.first_index : self.first_index + len(self.ranges)]
 
     def monic(self, unknowns: Sequence[Any]) -> list[Any]:
@@ -94,36 +94,36 @@ class Piece:
         return []
 
 
-def enumerate_pieces(name: str, complex_h: bool) -> Iterator[tuple[Piece, ...]]:
+def enumerate_pieces(name: str, is_complex: bool) -> Iterator[tuple[Piece, ...]]:
     """Yield all choices of small and large roots of a pattern.
 
     Args:
-        complex_h: whether the unknowns are eigenvalues of a complex H, which are all small; `name` is then the
-            pattern of its real double.
+        is_complex: whether the roots are those of a complex H, which are all small; `name` is then the pattern of the
+            real matrix of twice the size.
     """
-    for choice in product(*(list(_part_pieces(part, complex_h)) for part in parse_components(name))):
+    for choice in product(*(list(_part_pieces(part, is_complex)) for part in parse_components(name))):
         pieces: list[Piece] = []
-        for kind, order, outer in (piece for part_pieces in choice for piece in part_pieces):
-            pieces.append(Piece(kind, order, outer, sum(len(p.ranges) for p in pieces)))
+        for kind, order, is_outer in (piece for part_pieces in choice for piece in part_pieces):
+            pieces.append(Piece(kind, order, is_outer, sum(len(p.ranges) for p in pieces)))
         yield tuple(pieces)
 
 
-def _part_pieces(part: Component, complex_h: bool) -> Iterator[list[tuple[str, int, bool]]]:
-    """Yield the choices of (kind, power, outer) for the factors of one part of a pattern."""
-    if complex_h:
+def _part_pieces(part: Component, is_complex: bool) -> Iterator[list[tuple[str, int, bool]]]:
+    """Yield each choice for one part of a pattern: (kind, order, is_outer) for each of its factors."""
+    if is_complex:
         yield [("point", part.order, False) if part.kind == "CEP" else ("line", part.roots // 2, False)] * part.count
     elif part.kind == "capsize":
         yield [("zero", 1, False)]
     elif part.kind in ("weave", "resonance"):
-        yield from ([("axis", part.order + (part.kind == "resonance"), outer)] for outer in (False, True))
+        yield from ([("axis", part.order + (part.kind == "resonance"), is_outer)] for is_outer in (False, True))
     elif part.kind == "EP" and part.count == 2:
         yield [("meeting", part.order, False)]
         yield [("meeting", part.order, True)]
         yield [("root", part.order, False), ("root", part.order, True)]
     else:
         kind = "root" if part.kind == "EP" else "pair"
-        for inner in range(part.count + 1):
-            yield [(kind, part.order, k >= inner) for k in range(part.count)]
+        for inner_count in range(part.count + 1):
+            yield [(kind, part.order, k >= inner_count) for k in range(part.count)]
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class RotatingFrame:
 
 
 def find_rotating_frame(problem: Posed) -> RotatingFrame | None:
-    """Find the frame of a complex H by Gershgorin discs over the box; None if they are unbounded, or for a real model.
+    """Find the frame of a complex H by Gershgorin discs over the box; None for a real model or unbounded discs.
 
     Raises:
         UnsupportedOperation: for an operation without interval arithmetic.
@@ -152,8 +152,8 @@ def find_rotating_frame(problem: Posed) -> RotatingFrame | None:
     intervals = entry_ranges.reshape(n, n, 2, 2)
     centre = float(-intervals[range(n), range(n), 1].mean())
     intervals[range(n), range(n), 1] += centre
-    reach = np.hypot(*np.moveaxis(np.abs(intervals).max(axis=3), 2, 0)).sum(axis=1).max() + _ROUNDING * abs(centre)
-    return RotatingFrame(Fraction(centre), Fraction(reach * (1 + _ROUNDING) or 1.0))
+    radius = np.hypot(*np.moveaxis(np.abs(intervals).max(axis=3), 2, 0)).sum(axis=1).max() + _ROUNDING * abs(centre)
+    return RotatingFrame(Fraction(centre), Fraction(radius * (1 + _ROUNDING) or 1.0))
 
 
 def _complex_matrix(problem: Posed, parameters: Mapping[str, Any]) -> list[list[Pair]]:
@@ -174,30 +174,30 @@ def _complex_coefficients(problem: Posed, parameters: Mapping[str, Any], frame: 
 
 
 def values_at(
-    problem: Posed, lifted: Sequence[Quantity], at: Mapping[str, Any], constants: Mapping[str, Any]
+    problem: Posed, lifted: Sequence[Quantity], point: Mapping[str, Any], constants: Mapping[str, Any]
 ) -> Values:
-    """Values of a model.
+    """Values of a model at a point.
 
     Args:
-        lifted: quantities that are unknowns.
-        at: parameters (angles as tangents) and lifted quantities by name.
-        constants: parameters by name, angles as angles; they take precedence over `at`.
+        lifted: quantities that are unknowns with an equation of their own.
+        point: name of a parameter or lifted quantity → value; for an angle, the value of its tangent.
+        constants: parameter → value, for an angle the angle itself; they take precedence over `point`.
     """
     parameter_set, lifted_names = problem.parameter_set, {q.name for q in lifted}
     parameters = {
-        n: constants[n] if n in constants else atan(at[n]) if parameter_set[n].tangent else at[n]
+        n: constants[n] if n in constants else atan(point[n]) if parameter_set[n].tangent else point[n]
         for n in parameter_set.names
     }
     return Values(
-        problem.model, parameter_set, parameters, lift=lambda q, v: at[q.name] if q.name in lifted_names else None
+        problem.model, parameter_set, parameters, lift=lambda q, v: point[q.name] if q.name in lifted_names else None
     )
 
 
 def extra_equations(
-    values: Values, lifted: Sequence[Quantity], equalities: Sequence[Expression], at: Mapping[str, Any]
+    values: Values, lifted: Sequence[Quantity], equalities: Sequence[Expression], point: Mapping[str, Any]
 ) -> list[Any]:
-    """Left sides of the equations for lifted quantities and == constraints, which the pattern does not imply."""
-    left_sides = [values.fold(q.left_side, {q.name: at[q.name]})[0] for q in lifted if q.equation]
+    """Left sides of the equations that do not come from the pattern: for lifted quantities and == constraints."""
+    left_sides = [values.fold(q.left_side, {q.name: point[q.name]})[0] for q in lifted if q.equation]
     return left_sides + [e(values) for e in equalities]
 
 
@@ -212,9 +212,9 @@ class PatternSystem:
         names: all unknowns.
         lifted: the quantities among them.
         equations: left sides, as many as unknowns.
-        shared: further left sides, needed because a root of size 1 counts as small and as large.
+        shared: left sides of more equations; without them, one root of size 1 could count as a small and a large root.
         nonnegative: expressions that must be ≥ 0, so that the unknowns fit the pattern.
-        ascending: expressions that must be ≥ 0, which fixes the order of interchangeable factors.
+        ascending: expressions that must be ≥ 0; they fix the order of interchangeable factors.
         leading: the leading coefficient.
         limits: left minus right side of each inequality.
     """
@@ -242,19 +242,22 @@ def build_system(
     """
     unknowns = tuple(f":{k}" for k in range(sum(len(p.ranges) for p in pieces)))
     names = (*problem.free, *(q.name for q in lifted), *unknowns)
-    at = {n: symbol(n) for n in names}
-    pattern_unknowns = [at[n] for n in unknowns]
-    values = values_at(problem, lifted, at, problem.as_nodes(problem.fixed))
+    point = {n: symbol(n) for n in names}
+    pattern_unknowns = [point[n] for n in unknowns]
+    values = values_at(problem, lifted, point, problem.as_nodes(problem.fixed))
     if (abscissa := _abscissa(problem, pieces, scale, pattern_unknowns)) is not None:
         values = values.with_known({"abscissa": abscissa})
     if isinstance(scale, RotatingFrame):
-        a = _complex_coefficients(problem, values.given[2], scale)
+        *_, parameters = values.given
+        a = _complex_coefficients(problem, parameters, scale)
     else:
         lead, unit = Fraction(scale.lead), Fraction(scale.unit)
         a = [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
     equalities = [c for c in problem.conditions.values() if c.equality]
     nonnegative = [x for piece in pieces for x in piece.nonnegative(pattern_unknowns)]
-    interchangeable = [(p, q) for p, q in pairwise(pieces) if (p.kind, p.order, p.outer) == (q.kind, q.order, q.outer)]
+    interchangeable = [
+        (p, q) for p, q in pairwise(pieces) if (p.kind, p.order, p.is_outer) == (q.kind, q.order, q.is_outer)
+    ]
     limits = {n: c for n, c in problem.conditions.items() if not c.equality and all(name in values for name in c.names)}
     conditions = divisibility_conditions(a, pieces, pattern_unknowns)
     real_conditions = [part for x in conditions for part in ((x.re, x.im) if isinstance(x, Pair) else (x,))]
@@ -263,7 +266,7 @@ def build_system(
         pieces,
         names,
         lifted,
-        equations=formula([*real_conditions, *extra_equations(values, lifted, equalities, at)], names),
+        equations=formula([*real_conditions, *extra_equations(values, lifted, equalities, point)], names),
         shared=formula(shared_conditions(a, pieces, pattern_unknowns), names),
         nonnegative=formula(nonnegative, names),
         ascending=formula(
@@ -275,14 +278,14 @@ def build_system(
 
 
 def _abscissa(problem: Posed, pieces: Sequence[Piece], scale: Scale | RotatingFrame, u: Sequence[Any]) -> Any:
-    """The largest real part, if the pattern ties all roots; otherwise None."""
+    """The largest real part, if the pattern fixes all roots; otherwise None."""
     if problem.pattern is None or problem.pattern.abscissa is None:
         return None
     (piece,) = pieces
     unit, own_unknowns = Fraction(scale.unit), piece.own_unknowns(u)
     if piece.kind in ("root", "point"):
-        return quotient(unit, own_unknowns[0]) if piece.outer else unit * own_unknowns[0]
-    return quotient(-unit * own_unknowns[0], 2 * own_unknowns[1]) if piece.outer else -unit * own_unknowns[0] / 2
+        return quotient(unit, own_unknowns[0]) if piece.is_outer else unit * own_unknowns[0]
+    return quotient(-unit * own_unknowns[0], 2 * own_unknowns[1]) if piece.is_outer else -unit * own_unknowns[0] / 2
 
 
 def divisibility_conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
@@ -292,10 +295,10 @@ def divisibility_conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns:
     terms. Otherwise they are the remainders, for small and for large roots separately; see `shared_conditions`.
     """
     conditions: list[Any] = []
-    for outer in (False, True):
-        dividend = a[::-1] if outer else a
-        factors = [p.monic(unknowns) for p in pieces if p.outer == outer for _ in range(p.order)]
-        factor_product = multiplied(*factors)
+    for is_outer in (False, True):
+        dividend = a[::-1] if is_outer else a
+        factors = [p.monic(unknowns) for p in pieces if p.is_outer == is_outer for _ in range(p.order)]
+        factor_product = polynomial_product(*factors)
         if len(factor_product) == len(a):
             return conditions + [c - dividend[0] * f for c, f in zip(dividend[1:], factor_product[1:], strict=True)]
         for factor in factors:
@@ -305,13 +308,14 @@ def divisibility_conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns:
 
 
 def shared_conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:
-    """The condition that `divisibility_conditions` omits: a small and a large root of size 1 are two roots.
+    """The conditions that `divisibility_conditions` omits: a small and a large root of size 1 are two roots.
 
-    The polynomial is divided by the small factors, and the quotient by the large ones; these are the remainders. There
-    are none if all factors are small or all are large.
+    The polynomial is divided by the factors of small roots, and the quotient by the factors of large roots. The
+    remainders of the second division must be 0. There are none if all roots are small or all are large.
     """
     inner_factors, outer_factors = (
-        [p.monic(unknowns) for p in pieces if p.outer == o for _ in range(p.order)] for o in (False, True)
+        [p.monic(unknowns) for p in pieces if p.is_outer == is_outer for _ in range(p.order)]
+        for is_outer in (False, True)
     )
     conditions: list[Any] = []
     if inner_factors and outer_factors:

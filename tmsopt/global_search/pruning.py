@@ -37,8 +37,8 @@ Box = tuple[tuple[float, float], ...]
 """Least and greatest value of each variable."""
 
 _TINY = 1e-300  # larger than any loss by underflow
-_GAIN = 0.5  # relative to a width: a box with a side shrunk below this is contracted again instead of split
-_MIN_BOXES = 64  # fewer boxes are split repeatedly, since this many take hardly longer than one
+_MAX_SHRUNK_PART = 0.5  # if a side shrinks below this part of its width, the box is contracted again, not split
+_MIN_BOXES = 64  # fewer boxes are split repeatedly, because so many boxes take hardly longer than one
 _MARGIN = 0.1  # relative to a width: how far Newton's box extends beyond each end
 _MIN_MARGIN = 1e-12  # relative to the first box: least value of that margin
 
@@ -66,7 +66,7 @@ class PrunedBoxes:
 
     Attributes:
         remaining: parts that may hold zeros.
-        proved: pairs along a first axis: boxes with exactly one zero, and their parts that hold the zero.
+        proved: boxes with exactly one zero, and the parts of these that hold the zero, stacked along a first axis.
         small: parts that may hold zeros and are too small to split.
     """
 
@@ -85,26 +85,24 @@ def prune(conditions: BoxConditions, x: Array, min_width: float) -> PrunedBoxes:
     with np.errstate(all="ignore"):
         widths = x[1] - x[0]
         for graph, target in ((conditions.equations, 0.0), (conditions.extra, 0.0), (conditions.limits, np.inf)):
-            x, may_hold_zero = _contract(graph, x, target)
-            x, widths = x[..., may_hold_zero], widths[:, may_hold_zero]
+            x, can_hold_zero = _contract(graph, x, target)
+            x, widths = x[..., can_hold_zero], widths[:, can_hold_zero]
         wide_boxes, image_boxes, has_one_zero, weights = _apply_newton(conditions, x)
         x = _intersect(x, image_boxes)
-        may_hold_zero = (x[0] <= x[1]).all(axis=0)
-        is_proved, is_open = may_hold_zero & has_one_zero, may_hold_zero & ~has_one_zero
-        contract_again = is_open & (x[1] - x[0] < _GAIN * widths).any(axis=0)
-        must_split = is_open & ~contract_again
-        parts, small = _split_boxes(
-            x[..., must_split], weights[:, must_split], min_width * _as_column(conditions.widths)
-        )
+        can_hold_zero = (x[0] <= x[1]).all(axis=0)
+        is_proved, is_open = can_hold_zero & has_one_zero, can_hold_zero & ~has_one_zero
+        is_contracted_again = is_open & (x[1] - x[0] < _MAX_SHRUNK_PART * widths).any(axis=0)
+        is_split = is_open & ~is_contracted_again
+        parts, small = _split_boxes(x[..., is_split], weights[:, is_split], min_width * _as_column(conditions.widths))
         return PrunedBoxes(
-            np.concatenate([x[..., contract_again], parts], axis=-1),
+            np.concatenate([x[..., is_contracted_again], parts], axis=-1),
             np.stack([wide_boxes, image_boxes])[..., is_proved],
             small,
         )
 
 
 def _split_boxes(x: Array, weights: Array, min_width: Array) -> tuple[Array, Array]:
-    """Halve boxes along the side of greatest weight, repeatedly if they are few; also returns those too small."""
+    """Halve boxes along the side of greatest weight, repeatedly if they are few; return parts and small boxes."""
     parts, small = x, x[..., :0]
     while True:
         width = parts[1] - parts[0]
@@ -141,7 +139,7 @@ def _apply_newton(conditions: BoxConditions, x: Array) -> tuple[Array, Array, Tr
     margin = _MARGIN * (x[1] - x[0]) + _MIN_MARGIN * first_widths
     wide_boxes = np.stack([x[0] - margin, x[1] + margin])
     middle = (wide_boxes[0] + wide_boxes[1]) / 2
-    reach = np.maximum(wide_boxes[1] - middle, middle - wide_boxes[0]) * (1 + UNIT) + _TINY
+    half_widths = np.maximum(wide_boxes[1] - middle, middle - wide_boxes[0]) * (1 + UNIT) + _TINY
     step_ranges = _evaluate_ranges(conditions.equations, np.stack([middle, middle]))
     outputs = [np.broadcast_to(step_ranges[o], wide_boxes[:, 0].shape) for o in conditions.equations.outputs]
     values = np.stack(outputs, axis=1)[:, :, None]
@@ -151,36 +149,36 @@ def _apply_newton(conditions: BoxConditions, x: Array) -> tuple[Array, Array, Tr
     is_singular = ~np.isfinite(determinants) | (determinants == 0)
     centre[is_singular] = np.eye(len(first_widths))  # the bounds hold for any matrix
     inverse = np.moveaxis(np.linalg.inv(centre), 0, -1)
-    preconditioned = _bound_moves(_multiply_matrices(inverse, slopes), _multiply_matrices(inverse, values), reach)
-    moves = np.concatenate([_bound_moves(slopes, values, reach), preconditioned], axis=1)
+    preconditioned = _bound_moves(_multiply_matrices(inverse, slopes), _multiply_matrices(inverse, values), half_widths)
+    moves = np.concatenate([_bound_moves(slopes, values, half_widths), preconditioned], axis=1)
     image = _widen(middle + np.stack([moves[0].max(axis=0), moves[1].min(axis=0)]))
     diagonal = np.einsum("ekkm->ekm", preconditioned)
     zero_ranges = _widen(middle + diagonal)
     has_one_zero = (
-        (np.abs(diagonal).max(axis=0) < reach * (1 - 4 * UNIT))
+        (np.abs(diagonal).max(axis=0) < half_widths * (1 - 4 * UNIT))
         & (zero_ranges[0] > wide_boxes[0])
         & (zero_ranges[1] < wide_boxes[1])
     )
-    parts = np.abs(slopes).max(axis=0) * reach
-    smear = (parts / np.maximum(parts.sum(axis=1, keepdims=True), _TINY)).sum(axis=0)
+    terms = np.abs(slopes).max(axis=0) * half_widths
+    sensitivity = (terms / np.maximum(terms.sum(axis=1, keepdims=True), _TINY)).sum(axis=0)
     share = np.minimum((x[1] - x[0]) / np.maximum(first_widths, _TINY), 1.0)
-    weights = np.where(np.isfinite(smear), smear + 1e-3 * share, share)
+    weights = np.where(np.isfinite(sensitivity), sensitivity + 1e-3 * share, share)
     return wide_boxes, image, has_one_zero.all(axis=0), weights
 
 
-def _bound_moves(matrix: Array, values: Array, reach: Array) -> Array:
-    """Moves of each variable, up to `reach`, that each equation (matrix · move + value = 0) allows."""
-    terms = np.abs(matrix).max(axis=0) * reach
-    growth = 1 + (len(reach) + 4) * UNIT
-    other_terms = terms.sum(axis=1, keepdims=True) * growth - terms / growth + _TINY  # of all variables but one
+def _bound_moves(matrix: Array, values: Array, half_widths: Array) -> Array:
+    """Bound the move of each variable, at most a half width, by each equation (matrix · move + value = 0)."""
+    terms = np.abs(matrix).max(axis=0) * half_widths
+    growth = 1 + (len(half_widths) + 4) * UNIT
+    other_terms = terms.sum(axis=1, keepdims=True) * growth - terms / growth + _TINY  # sum without the variable itself
     return _divide(_widen(np.stack([-values[1] - other_terms, -values[0] + other_terms])), matrix)
 
 
 def _multiply_matrices(exact: Array, x: Array) -> Array:
     """Multiply matrices of doubles by matrices of intervals; the rounding bound holds for any order of summation."""
     middle, rounding = (x[0] + x[1]) / 2, (len(exact) + 4) * UNIT
-    reach = (x[1] - x[0]) * (0.5 + UNIT) + rounding * np.abs(middle) + _TINY
-    centre, error = (np.einsum("ijm,jkm->ikm", *matrices) for matrices in ((exact, middle), (np.abs(exact), reach)))
+    radius = (x[1] - x[0]) * (0.5 + UNIT) + rounding * np.abs(middle) + _TINY
+    centre, error = (np.einsum("ijm,jkm->ikm", *matrices) for matrices in ((exact, middle), (np.abs(exact), radius)))
     error = error * (1 + rounding) + _TINY
     return _widen(np.stack([centre - error, centre + error]))
 
@@ -231,10 +229,10 @@ def _multiply(a: Array, b: Array) -> Array:
 
 
 def _invert(a: Array) -> Array:
-    """1/a; unbounded if a contains both signs."""
-    single = (a[0] >= 0) | (a[1] <= 0)
-    low = np.where(single & (a[1] != 0), 1 / a[1], -np.inf)
-    high = np.where(single & (a[0] != 0), 1 / a[0], np.inf)
+    """1/a; unbounded if a contains numbers of both signs."""
+    has_one_sign = (a[0] >= 0) | (a[1] <= 0)
+    low = np.where(has_one_sign & (a[1] != 0), 1 / a[1], -np.inf)
+    high = np.where(has_one_sign & (a[0] != 0), 1 / a[0], np.inf)
     return _widen(np.stack([low, high]))
 
 
@@ -280,12 +278,12 @@ class _Operation:
     Attributes:
         value: operands → range of the result.
         slopes: operands and result → slope with respect to each operand; infinite if undefined.
-        back: result and operands → range of each operand.
+        operand_ranges: result and operands → range of each operand.
     """
 
     value: Callable[..., Array]
     slopes: Callable[..., tuple[Array, ...]]
-    back: Callable[..., tuple[Array, ...]]
+    operand_ranges: Callable[..., tuple[Array, ...]]
 
 
 _ONE, _SIGNS = np.ones((2, 1)), np.array([[-1.0], [1.0]])
@@ -303,12 +301,12 @@ def _undo_absolute(result: Array, a: Array) -> tuple[Array]:
 
 
 def _unary_operation(
-    name: str, value: Callable[..., Array] | None = None, back: Any = lambda _, a: (_UNBOUNDED,)
+    name: str, value: Callable[..., Array] | None = None, operand_ranges: Any = lambda _, a: (_UNBOUNDED,)
 ) -> _Operation:
     """An operation with one operand; its slope, and by default its value, come from ball arithmetic."""
     function = INTERVALS.operations[name]
     slope = _lift_to_arrays(lambda x: function(flint.arb_series([x, 1], prec=2))[1])
-    return _Operation(value or _lift_to_arrays(function), lambda a, _: (slope(a),), back)
+    return _Operation(value or _lift_to_arrays(function), lambda a, _: (slope(a),), operand_ranges)
 
 
 _QUOTIENT = _Operation(
@@ -326,7 +324,7 @@ _OPERATIONS = {
     "sqrt": _unary_operation("sqrt", _square_root, lambda r, _: (_square(np.maximum(r, 0.0)),)),
     **dict.fromkeys(("div", "quotient", "ratio"), _QUOTIENT),
     **{name: _unary_operation(name) for name in ("exp", "log", "sin", "cos", "tan", "atan")},
-    **{name: _unary_operation(name, back=lambda _, a: (_SIGNS,)) for name in ("asin", "acos")},
+    **{name: _unary_operation(name, operand_ranges=lambda _, a: (_SIGNS,)) for name in ("asin", "acos")},
 }
 
 
@@ -392,9 +390,9 @@ def _evaluate_slopes(graph: Formula, x: Array) -> Array:
 
 
 def _contract(graph: Formula, x: Array, upper_end: float) -> tuple[Array, Truth]:
-    """Contract boxes around points with all outputs between 0 and `upper_end`; also returns which boxes may hold any.
+    """Contract boxes to the points with all outputs between 0 and `upper_end`; also return which boxes may hold any.
 
-    Evaluates the steps forward, then bounds each operand from the result and the other operand (Benhamou et al. 1999).
+    Evaluate the steps forward, then bound each operand from the result and the other operand (Benhamou et al. 1999).
     """
     step_ranges, narrowed_boxes = _evaluate_ranges(graph, x), x.copy()
     is_possible = np.ones(x.shape[-1], dtype=bool)
@@ -409,7 +407,7 @@ def _contract(graph: Formula, x: Array, upper_end: float) -> tuple[Array, Truth]
         if op == INPUT:
             narrowed_boxes[:, graph.names.index(value)] = step_ranges[k]
         elif op != CONSTANT:
-            operand_ranges = _OPERATIONS[op].back(step_ranges[k], *(step_ranges[o] for o in operands))
+            operand_ranges = _OPERATIONS[op].operand_ranges(step_ranges[k], *(step_ranges[o] for o in operands))
             for o, operand_range in zip(operands, operand_ranges, strict=True):
                 narrow_step(o, operand_range)
     return narrowed_boxes, is_possible

@@ -34,10 +34,10 @@ class Question:
     """Whether any design reaches a limit.
 
     Attributes:
-        cases: cases in which the limits must hold; a bound for fewer cases holds for more.
+        cases: cases in which the limits must hold; a bound for some of the cases holds for all.
         limit: value of the objective to reach; None asks for any feasible design.
         unit: typical size of the roots, a power of two.
-        compact: map squared frequencies to a finite range; this is slower, but no variable becomes huge.
+        compact: whether to map squared frequencies to a finite range; this is slower, but no variable becomes huge.
     """
 
     problem: Posed
@@ -47,7 +47,7 @@ class Question:
     compact: bool = False
 
     def possible_signs(self) -> dict[int, dict[int, int]]:
-        """Each possible sign of a0 in the first case → case number → sign of a0 in that case, if it is certain."""
+        """Possible sign of a0 in the first case → (index of a case → sign of a0 in that case, if it is certain)."""
         build = Builder(self.problem, self.cases)
         leading = [compact_coefficients(self.problem.model, values)[0] for values in build.values]
         sign_options = [(upper > 0, lower < 0) for lower, upper in build.enclose(leading)]
@@ -56,8 +56,8 @@ class Question:
             k: 1 if positive else -1 for k, (positive, negative) in enumerate(sign_options) if positive != negative
         }
         equal_cases = [k for k, a in enumerate(leading) if formula([a]) == formula([leading[first_case]])]
-        possible = [sign for sign, is_possible in zip((1, -1), sign_options[first_case], strict=True) if is_possible]
-        return {sign: case_signs | dict.fromkeys(equal_cases, sign) for sign in possible}
+        signs = [sign for sign, is_possible in zip((1, -1), sign_options[first_case], strict=True) if is_possible]
+        return {sign: case_signs | dict.fromkeys(equal_cases, sign) for sign in signs}
 
     def leading_program(self, sign: int) -> NLP | None:
         """The NLP for the least leading coefficient under the constraints; None if the box keeps it away from 0."""
@@ -69,12 +69,12 @@ class Question:
         build.add_constraints(without=self.problem.asked_of_roots)
         return build.finish("leading")
 
-    def program(self, sign: int, least: float = 0.0) -> NLP:
-        """The question as an NLP, for one sign of a0 with |a0| ≥ `least`."""
+    def program(self, sign: int, least_lead: float = 0.0) -> NLP:
+        """The question as an NLP, for one sign of a0 with |a0| ≥ `least_lead`."""
         problem, signs = self.problem, self.possible_signs()[sign]
         if problem.asks(ANGULAR_FREQUENCY):
             raise UnsupportedOperation(ANGULAR_FREQUENCY)
-        frame = Frame(problem.model, signs, self.unit, rewards_change_of(problem, "abscissa"), self.compact, least)
+        frame = Frame(problem.model, signs, self.unit, rewards_change_of(problem, "abscissa"), self.compact, least_lead)
         lift_functions = {"abscissa": partial(add_half_planes, frame), "damping_ratio": partial(add_sectors, frame)}
         lifts: Mapping[str, LiftFunction] = lift_functions
         build = Builder(problem, self.cases, lifts)
@@ -97,12 +97,12 @@ class Question:
         return build.finish("bound")
 
     def _required_value(self, name: str) -> float | None:
-        """The value that a root quantity must reach; None if the problem has no such requirement on it."""
+        """The value that a root quantity must reach; None if the problem does not require a single value."""
         problem, worse_sign = self.problem, _WORSE_DIRECTION[name]
         thresholds: list[float | None] = []
         if self.limit is not None and problem.objective is not None and name in problem.objective.names:
-            is_alone = problem.objective.text.strip() == name and not rewards_change_of(problem, name, worse_sign)
-            thresholds.append(self.limit if is_alone else None)
+            is_objective = problem.objective.text.strip() == name and not rewards_change_of(problem, name, worse_sign)
+            thresholds.append(self.limit if is_objective else None)
         thresholds += [_threshold(c, name, worse_sign) for c in problem.conditions.values() if name in c.names]
         values = [value for value in thresholds if value is not None]
         if not thresholds or len(values) < len(thresholds):
@@ -111,7 +111,7 @@ class Question:
 
 
 def _threshold(condition: Expression, name: str, worse_sign: float) -> float | None:
-    """The worst value of a quantity that a comparison allows; None unless it is linear in that quantity alone."""
+    """The worst value of a quantity that a comparison allows; None unless the comparison is linear in it only."""
     if condition.names != (name,) or condition.equality:
         return None
     if not is_linear(formula([condition({name: symbol(name)})], [name])):  # |ζ| ≥ 1/2 looks linear from 0 to 1

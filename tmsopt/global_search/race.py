@@ -1,7 +1,7 @@
 """Runs a global solver on several tasks in parallel; the first infeasible one stops the others.
 
-SCIP can crash, and it does crash if two threads of one process run it. In a separate process a crash ends nothing else,
-the solver can be stopped at any moment, and its output is hidden.
+SCIP can crash, and it does crash if two threads of one process run it. In a separate process, a crash affects nothing
+else, the solver can be stopped at any moment, and its output is hidden.
 """
 
 import time
@@ -12,8 +12,8 @@ from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.global_search.tasks import INFEASIBLE, UNDECIDED, Decision, GlobalSolver, SolverFailed, Task
 from tmsopt.killable import Killable, ProcessEnded
 
-_TICK = 0.02  # seconds between polls
-_GRACE = 5.0  # seconds by which a solver may overrun its limit; SCIP does while it solves a relaxation
+_POLL_SECONDS = 0.02  # time between polls
+_GRACE_SECONDS = 5.0  # time by which a solver may exceed its limit; SCIP does so while it solves a relaxation
 
 
 class SolverPool:
@@ -54,13 +54,13 @@ class SolverPool:
                 process = self._idle.pop()
                 running.append((process, process.call(self._solver.decide, task)))
             answers = [answer for _, answer in running]
-            while open_answers := [answer for answer in answers if not answer.done()]:
+            while pending_answers := [answer for answer in answers if not answer.done()]:
                 tick()
-                finished_answers, _ = wait(open_answers, _TICK, FIRST_COMPLETED)
+                finished_answers, _ = wait(pending_answers, _POLL_SECONDS, FIRST_COMPLETED)
                 decided_answers = (answer for answer in answers if answer.done() and not answer.exception())
                 if not finished_answers and any(answer.result().verdict == INFEASIBLE for answer in decided_answers):
-                    break  # after one more poll: a process that is nearly done can be kept, one that is ended cannot
-                time_allowed = time.monotonic() - began - _GRACE
+                    break  # this waits for one poll more, because a process that finishes in it can be reused
+                time_allowed = time.monotonic() - began - _GRACE_SECONDS
                 for task, (process, answer) in zip(tasks, running, strict=True):
                     if task.seconds < time_allowed and not answer.done():
                         process.end()
@@ -74,7 +74,7 @@ class SolverPool:
 
 
 def _collect_decisions(answers: Sequence["Future[Decision]"]) -> list[Decision]:
-    """Decisions in the order of the tasks; undecided if the process was ended or crashed."""
+    """Collect the decisions in the order of the tasks; a task is undecided if its process crashed or was ended."""
     decisions, unsupported, failures = list[Decision](), list[UnsupportedOperation](), list[BaseException]()
     for answer in answers:
         match answer.exception() if answer.done() else ProcessEnded():

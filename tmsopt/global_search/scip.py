@@ -8,8 +8,8 @@ import numpy as np
 from tmsopt.global_search.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, GlobalSolver, Task
 from tmsopt.global_search.translation import FEASIBILITY, Translation
 
-_MIN_SECONDS = 0.01
-_MARGIN = 1e-6  # relative to a bound: how far the tolerances may move it
+_MIN_SECONDS = 0.01  # least time limit
+_MARGIN = 1e-6  # relative to a bound: error of the bound that the tolerances may cause
 
 
 def prepare() -> None:
@@ -25,7 +25,7 @@ def decide(task: Task) -> Decision:
     """
     began = time.perf_counter()
     translation = Translation(task.nlp)
-    if translation.impossible:
+    if translation.is_impossible:
         return Decision(INFEASIBLE, bound=math.inf)
     model = translation.model
     for x, (lower, upper) in zip(translation.x, task.box, strict=False):
@@ -52,7 +52,8 @@ def decide(task: Task) -> Decision:
 SCIP = GlobalSolver(
     name="SCIP",
     module="pyscipopt",
-    missing="PySCIPOpt is not installed; pip install 'tmsopt[certify]', from a checkout pip install '.[certify]'",
+    install_message="PySCIPOpt is not installed; pip install 'tmsopt[certify]', "
+    "from a checkout pip install '.[certify]'",
     tolerance=FEASIBILITY,
     prepare=prepare,
     decide=decide,

@@ -1,4 +1,4 @@
-"""Proves that no design is stable, by signs: if all roots lie left of the axis, all coefficients have the same sign."""
+"""Proves by signs that no design is stable: if all roots lie left of the axis, all coefficients have the same sign."""
 
 from collections import deque
 
@@ -9,11 +9,11 @@ from tmsopt.algebra.intervals import ranges
 from tmsopt.problem.problem import Posed
 from tmsopt.roots import hurwitz_minors
 
-_MAX_BOXES = 300  # parts of the box; after these, branch and bound takes over
+_MAX_BOXES = 300  # parts of the box that are tested; if these do not decide, branch and bound must
 
 
 def has_no_stable_design(problem: Posed) -> bool:
-    """Whether interval arithmetic proves that no design of the box is stable, whatever the constraints.
+    """Whether interval arithmetic proves that no design of the box is stable, even without the constraints.
 
     In each part of the box two coefficients differ in sign, or a coefficient and the Hurwitz determinant differ in sign
     (for degree 3 or 4). False for a problem with several cases or nothing free.

@@ -20,8 +20,8 @@ SOLVER = SCIP
 """The global solver in use, here and in `certify`."""
 
 _MARGIN = 1e-3  # relative to the typical size of the roots: decay that the second question requires
-_SHARE = 0.7  # share of the time for the proof
-_ACCEPT_ANY = partial(Answer, FOUND, None)
+_PROOF_SHARE = 0.7  # share of the time for the first question, the proof
+_ACCEPT_ANY = partial(Answer, FOUND, None)  # accepts every point that the solver finds
 
 
 @dataclass(frozen=True)
@@ -29,16 +29,16 @@ class Stability:
     """Whether any design is stable.
 
     Attributes:
-        any: True if a recheck confirms that `design` is stable, False if no design is (proved), None if unknown.
+        exists: True if a recheck confirms that `design` is stable, False if it is proved that no design is, else None.
         design: free parameters of a stable design; it may violate a limit by the solver's tolerance.
         proof: the kind of proof, in words.
-        failed: the error of the solver, if it failed.
+        failure: the error of the solver, or empty.
     """
 
-    any: bool | None = None
+    exists: bool | None = None
     design: Mapping[str, float] | None = None
     proof: str = ""
-    failed: str = ""
+    failure: str = ""
 
 
 def find_stable_design(
@@ -49,13 +49,13 @@ def find_stable_design(
 ) -> Stability:
     """Decide whether any design of the box has all roots left of the axis in every case listed.
 
-    The constraints and the pattern hold, except constraints on the roots themselves. The proof excludes roots on the
-    axis too, so the answer is None if the best designs lie on it. It is a floating-point proof, to the solver's
-    tolerance.
+    The design must satisfy the pattern and all constraints except those on the roots. The proof must also exclude roots
+    on the axis, so nothing is decided if the best designs have such roots. The proof is in floating-point arithmetic,
+    to the solver's tolerance.
 
     Args:
-        seconds: time limit of the solver, without the start of its processes.
-        known_design: parameters of the best known design; a question that excludes it proves nothing.
+        seconds: time limit of the solver; the start of its processes does not count.
+        known_design: parameters of the best known design; a question that excludes this design proves nothing.
         progress: called with the seconds used and the seconds granted.
 
     Raises:
@@ -63,33 +63,33 @@ def find_stable_design(
     """
     if has_no_stable_design(problem):
         return Stability(False, proof="by signs of coefficients, in interval arithmetic")
-    if not SOLVER.available or not problem.free:
+    if not SOLVER.is_available or not problem.free:
         return Stability()
     constraints = {n: text for n, text in problem.constraints.items() if n not in problem.asked_of_roots}
     relaxation = problem.derive(minimize="abscissa", maximize=None, pareto=(), constraints=constraints)
-    best = _recheck_point(
+    evaluation = _recheck_point(
         relaxation, {n: known_design[n] for n in problem.free} if known_design else default_start(problem)
     )
-    unit = typical_size(best.structure.roots)
+    unit = typical_size(evaluation.structure.roots)
     axis_question = Question(relaxation, relaxation.cases, 0.0, unit)
     with SolverPool(SOLVER) as pool:
         clock = Clock(seconds, pool, progress)
         try:
-            reply = answer_question(axis_question, clock, _SHARE, _ACCEPT_ANY)
-            is_proved = reply.verdict == INFEASIBLE
-            if is_proved and known_design is not None and not best.violations:
-                is_proved = _is_admitted(axis_question, best, known_design, clock)
+            answer = answer_question(axis_question, clock, _PROOF_SHARE, _ACCEPT_ANY)
+            is_proved = answer.verdict == INFEASIBLE
+            if is_proved and known_design is not None and not evaluation.violations:
+                is_proved = _is_admitted(axis_question, evaluation, known_design, clock)
             # A point with roots on the axis does not decide the question.
-            if reply.verdict == FOUND and _judge_point(relaxation, reply.point).design is None:
-                reply = answer_question(replace(axis_question, limit=-_MARGIN * unit), clock, 1.0, _ACCEPT_ANY)
+            if answer.verdict == FOUND and _judge_point(relaxation, answer.point).design is None:
+                answer = answer_question(replace(axis_question, limit=-_MARGIN * unit), clock, 1.0, _ACCEPT_ANY)
         except UnsupportedOperation:
             return Stability()
         except SolverFailed as error:
-            return Stability(failed=f"{SOLVER.name} failed: {error}")
+            return Stability(failure=f"{SOLVER.name} failed: {error}")
     if clock.interrupted:
         raise KeyboardInterrupt
     method_text = f"in floating-point arithmetic, by {SOLVER.name}, feasibility tolerance {SOLVER.tolerance:.0e}"
-    return Stability(False, proof=method_text) if is_proved else _judge_point(relaxation, reply.point)
+    return Stability(False, proof=method_text) if is_proved else _judge_point(relaxation, answer.point)
 
 
 def _recheck_point(problem: Posed, design: Mapping[str, float]) -> Evaluation:
@@ -97,7 +97,7 @@ def _recheck_point(problem: Posed, design: Mapping[str, float]) -> Evaluation:
 
 
 def _judge_point(problem: Posed, design: Mapping[str, float] | None) -> Stability:
-    """The verdict on a point that the solver found."""
+    """Decide by a recheck whether a point that the solver found is stable."""
     if design is not None:
         evaluation = _recheck_point(problem, design)
         if max(evaluation.structure.abscissa, evaluation.realised) < 0:
@@ -105,8 +105,8 @@ def _judge_point(problem: Posed, design: Mapping[str, float] | None) -> Stabilit
     return Stability()
 
 
-def _is_admitted(question: Question, best: Evaluation, known_design: Mapping[str, float], clock: Clock) -> bool:
+def _is_admitted(question: Question, evaluation: Evaluation, known_design: Mapping[str, float], clock: Clock) -> bool:
     """Whether the question and the solver admit a known design, for a line just right of its roots."""
     design = {n: known_design[n] for n in question.problem.free}
-    wider_question = replace(question, limit=best.structure.abscissa + _MARGIN * question.unit)
+    wider_question = replace(question, limit=evaluation.structure.abscissa + _MARGIN * question.unit)
     return not find_exclusion(wider_question, design) and not is_excluded_by_solver(wider_question, design, clock)

@@ -17,7 +17,7 @@ INFEASIBLE, FOUND, UNDECIDED = "infeasible", "found", "undecided"
 
 
 class SolverFailed(RuntimeError):
-    """A global solver or its installation raised an error (the message, in one line) and decided nothing."""
+    """A global solver, or its installation, raised an error and decided nothing; the message is one line."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,8 @@ class Task:
 
     Attributes:
         nlp: only its functions, and the ranges of its variables and rows, are used.
-        minimise: find the least objective; otherwise any feasible point.
+        seconds: time limit.
+        minimise: whether to find the least objective; otherwise any feasible point is enough.
         box: narrower ranges for the first variables.
     """
 
@@ -58,9 +59,9 @@ class GlobalSolver:
     """A solver that decides tasks by branch and bound in a separate process.
 
     Attributes:
-        name: used in reports; in lower case the `method` of its bounds.
+        name: its name in reports; in lower case, the `method` of its bounds.
         module: the Python module that it needs.
-        missing: the message if that module is not installed.
+        install_message: the message if that module is not installed.
         tolerance: feasibility tolerance of a row; 0 for exact arithmetic.
         prepare: called once in the process, before the first task.
         decide: decides a task; raises UnsupportedOperation for an unsupported operation.
@@ -68,18 +69,17 @@ class GlobalSolver:
 
     name: str
     module: str
-    missing: str
+    install_message: str
     tolerance: float
     prepare: Callable[[], None]
     decide: Callable[[Task], Decision]
 
     @property
-    def available(self) -> bool:
+    def is_available(self) -> bool:
         """Whether its module is installed."""
         return importlib.util.find_spec(self.module) is not None
 
 
 def make_task(nlp: NLP, seconds: float, *, minimise: bool = False, box: tuple[tuple[float, float], ...] = ()) -> Task:
-    """A task from the parts of an NLP that a solver reads, which can always be pickled."""
-    bare = replace(nlp, lifts=(), contacts={}, products=(), cases=())
-    return Task(bare, seconds, minimise, box)
+    """Make a task from the parts of an NLP that a solver reads; these can always be pickled."""
+    return Task(replace(nlp, lifts=(), contacts={}, products=(), cases=()), seconds, minimise, box)

@@ -1,7 +1,7 @@
-"""An NLP as factorable polynomial equations for SCIP.
+"""Translates an NLP to factorable polynomial equations for SCIP.
 
 A quadratic expression gets a variable when it is multiplied again. It gets the variable only once, so that the
-relaxation shares it as the formula does. Quotients, radicals and arctangents become equations without them.
+relaxation shares it as the formula does. Equations replace quotients, radicals and arctangents.
 """
 
 import math
@@ -20,15 +20,17 @@ from tmsopt.program.nlp import NLP
 FEASIBILITY = 1e-9
 """SCIP's feasibility tolerance of a row."""
 
-_MIN_POWER = -60  # least scale, as a power of two; numbers that are smaller count as 0
-_HUGE = 1e15  # largest number accepted; SCIP treats 1e20 as infinite
-_LARGE = 1e3  # largest number that a coefficient below 1e-9 may multiply, since SCIP drops such a coefficient
-_MAX_EXPONENT = 1000
+_MIN_POWER = -60  # exponent of the least scale, a power of two; smaller numbers count as 0
+_MAX_NUMBER = 1e15  # largest number accepted; SCIP treats 1e20 as infinite
+_MAX_SCALED_NUMBER = (
+    1e3  # largest number that a coefficient below 1e-9 may multiply, since SCIP drops such a coefficient
+)
+_MAX_EXPONENT = 1000  # largest exponent of a power
 
 _RANGES = INTERVALS.operations
 
 _CANCELLATION = 2.0**-10
-"""Least scale of a row relative to its largest summand; a smaller one would demand more than double precision."""
+"""Least scale of a row relative to its largest summand; a smaller scale would need more than double precision."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,8 @@ class Term:
         ball: its range, as a midpoint and a radius.
         size: bound on its summands, which may cancel each other.
         tangent: the operand, if the term is an arctangent.
-        symbol, scale: for a variable, whose expression is scale · symbol.
+        symbol: the SCIP variable, if the term is scale · symbol.
+        scale: its scale.
     """
 
     expression: Any
@@ -54,11 +57,12 @@ class Term:
 
     @property
     def ends(self) -> Interval:
+        """Least and greatest value."""
         return interval(self.ball) if self.degree else (self.expression, self.expression)
 
     @property
     def unit(self) -> float:
-        """The power of two, at most 1, that scales a row of this term to about 1 if the row is divided by it."""
+        """The power of two, at most 1, by which a row of this term is divided to make it about 1."""
         return max(_scale_of(max(map(abs, self.ends))), min(_CANCELLATION * _scale_of(self.size), 1.0))
 
 
@@ -69,7 +73,7 @@ class Translation:
         model: of pyscipopt, without objective.
         x: the variables of the NLP, each a SCIP variable times its scale.
         objective: the expression to minimise.
-        impossible: whether a constant row is violated.
+        is_impossible: whether no point is feasible, because a constant row is violated or a value undefined.
     """
 
     def __init__(self, nlp: NLP) -> None:
@@ -80,11 +84,11 @@ class Translation:
         """
         import pyscipopt
 
-        self.functions = pyscipopt
+        self.scip = pyscipopt
         self.model = pyscipopt.Model()
         self.model.hideOutput()
         self.count = 0
-        self.impossible = False
+        self.is_impossible = False
         self.cache: dict[tuple[str, int], tuple[Term, Any]] = {}
         self.x = [self.add_variable(*ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
         objective, *rows = nlp.fold(self.x, self.kind(), self.as_affine)
@@ -107,7 +111,7 @@ class Translation:
         return self.add_variable(max(ends[0], lower), ends[1], enclosure)
 
     def as_affine(self, term: Term) -> Term:
-        """A term of degree 1 at most; a quadratic term gets a variable, once."""
+        """Return a term of degree 1 at most; a quadratic term gets a variable, once."""
         affine_term: Term = term if term.degree < 2 else self.remember("variable", term, self.add_equal_variable)
         return affine_term
 
@@ -118,7 +122,7 @@ class Translation:
         return variable
 
     def remember(self, name: str, term: Term, make: Callable[[Term], Any]) -> Any:
-        """The result of `make` for a term, made once; the cache keeps the term, so its id stays unique."""
+        """Return `make(term)`, computed once for each term; the cache keeps the term, so its id stays unique."""
         if (name, id(term)) not in self.cache:
             self.cache[name, id(term)] = term, make(term)
         return self.cache[name, id(term)][1]
@@ -130,7 +134,7 @@ class Translation:
     def add_row(self, term: Term, lower: float, upper: float) -> None:
         """Add a row, scaled to about 1."""
         if term.degree == 0:
-            self.impossible |= not lower - FEASIBILITY <= term.expression <= upper + FEASIBILITY
+            self.is_impossible |= not lower - FEASIBILITY <= term.expression <= upper + FEASIBILITY
             return
         size = term.unit
         if lower == upper:
@@ -141,7 +145,7 @@ class Translation:
             self.model.addCons(term.expression / size <= upper / size)
 
     def kind(self) -> Kind:
-        """The kind of numbers that translates a formula to terms."""
+        """Return the operations (a `Kind` of numbers) that translate a formula to terms."""
         return Kind(
             {
                 "add": lambda a, b: self.add(a, b, 1.0),
@@ -172,7 +176,7 @@ class Translation:
 
     def scale_by(self, a: Term, factor: float) -> Term:
         if 0 < abs(factor) < FEASIBILITY:
-            _refuse_huge(a.ball, "a small multiple", _LARGE)
+            _check_size(a.ball, "a small multiple", _MAX_SCALED_NUMBER)
         return Term(factor * a.expression, a.degree, factor * a.ball, abs(factor) * a.size)
 
     def multiply(self, a: Term, b: Term) -> Term:
@@ -206,7 +210,7 @@ class Translation:
 
     def nonnegative_ends(self, a: Term) -> Interval:
         """The range of a term that must be ≥ 0."""
-        self.impossible |= a.ends[1] < 0
+        self.is_impossible |= a.ends[1] < 0
         return max(a.ends[0], 0.0), max(a.ends[1], 0.0)
 
     def take_root(self, a: Term) -> Term:
@@ -227,7 +231,7 @@ class Translation:
         if abs(exponent) > _MAX_EXPONENT:
             raise UnsupportedOperation(f"a power with an exponent beyond {_MAX_EXPONENT}")
         if exponent != int(exponent) and a.degree > 0 and a.ball.is_finite():
-            _refuse_huge(_RANGES["pow"](a.ball, b.ball), "a power")
+            _check_size(_RANGES["pow"](a.ball, b.ball), "a power")
         if exponent < 0:
             return self.divide(_constant(1.0), self.raise_to_power(a, _constant(-exponent)))
         if exponent != int(exponent):
@@ -253,18 +257,17 @@ class Translation:
         if a.degree == 0:
             return _constant(getattr(math, name)(a.expression))
         if name == "exp":
-            _refuse_huge(_RANGES[name](a.ball), "exp")
+            _check_size(_RANGES[name](a.ball), "exp")
         if a.tangent is not None and name in ("sin", "cos"):
             part: Term = self.remember("circle", a.tangent, self.add_circle_point)[name == "sin"]
             return part
         a = self.as_affine(a)
         v = self.add_bounded_variable(_RANGES[name](a.ball))
         if name == "log":  # as exp, since SCIP keeps the argument of log away from 0
-            self.add_equation(a.expression, self.functions.exp(v.expression), a.scale)
-        else:
-            # The error of the argument bounds how small the others can be.
+            self.add_equation(a.expression, self.scip.exp(v.expression), a.scale)
+        else:  # the tolerance of the argument makes a smaller scale of sin and cos useless
             size = v.scale if name == "exp" else max(v.scale, _CANCELLATION)
-            self.add_equation(v.expression, getattr(self.functions, name)(a.expression), size)
+            self.add_equation(v.expression, getattr(self.scip, name)(a.expression), size)
         return v
 
     def add_circle_point(self, t: Term) -> tuple[Term, Term]:
@@ -279,7 +282,7 @@ class Translation:
         """Add an angle, tied by its sine and cosine to its tangent."""
         angle = self.add_bounded_variable(t.ball.atan())
         for part, name in zip(self.remember("circle", t, self.add_circle_point), ("cos", "sin"), strict=True):
-            self.add_equation(part.expression, getattr(self.functions, name)(angle.expression))
+            self.add_equation(part.expression, getattr(self.scip, name)(angle.expression))
         return Term(angle.expression, 1, angle.ball, angle.size, tangent=t)
 
     def tangent(self, a: Term) -> Term:
@@ -292,7 +295,7 @@ class Translation:
         ends = (-math.pi / 2, math.pi / 2) if name == "sin" else (0.0, math.pi)
         enclosure = _RANGES[inverse](a.ball)
         angle = self.add_bounded_variable(enclosure) if enclosure.is_finite() else self.add_variable(*ends)
-        self.add_equation(self.as_affine(a).expression, getattr(self.functions, name)(angle.expression))
+        self.add_equation(self.as_affine(a).expression, getattr(self.scip, name)(angle.expression))
         return angle
 
     def absolute(self, a: Term) -> Term:
@@ -312,17 +315,17 @@ class Translation:
 
     def mark_impossible(self) -> Term:
         """Mark the NLP as infeasible, since no design has a value."""
-        self.impossible = True
+        self.is_impossible = True
         return _constant(0.0)
 
 
 def _constant(value: float) -> Term:
-    if math.isfinite(value) and abs(value) > _HUGE:
-        raise UnsupportedOperation(f"numbers beyond {_HUGE:g}")
+    if math.isfinite(value) and abs(value) > _MAX_NUMBER:
+        raise UnsupportedOperation(f"numbers beyond {_MAX_NUMBER:g}")
     return Term(float(value), 0, flint.arb(value), abs(float(value)))
 
 
-def _refuse_huge(enclosure: Any, name: str, limit: float = _HUGE) -> None:
+def _check_size(enclosure: Any, name: str, limit: float = _MAX_NUMBER) -> None:
     if enclosure.is_finite() and max(map(abs, interval(enclosure))) > limit:
         raise UnsupportedOperation(f"{name} of numbers beyond {limit:g}")
 

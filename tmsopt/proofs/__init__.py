@@ -1,7 +1,7 @@
 """Proofs that an exceptional point exists (interval Newton in balls) and that no better design does (branch and bound).
 
-In: a solution. Out: a `Proof`, whose numbers have radii, or the solution with a proved bound. Open `proof` first, then
-`certify`.
+The input is a solution. The result is a `Proof`, whose numbers have radii, or the solution with a proved bound. Open
+`proof` first, then `certify`.
 """
 
 import lazy_loader

@@ -31,19 +31,20 @@ PROVEN = 1e-4
 _FINE_LEVEL = 1e-6  # gap tried after PROVEN; a smaller gap would be within SCIP's tolerance
 _COARSE_LEVELS = (1e-2, 1e-1, 1.0, 10.0)  # gaps tried if PROVEN fails
 _FIRST_LEVELS = (1.0, 0.1, 1e-2, 1e-3, PROVEN)  # gaps tried first for a design that did not converge
-_MIN_RATIO = 1.5  # of the least gap proved to the largest gap not proved; below it, narrowing is not worth the time
-_SHARE = 0.6  # share of the time left for a gap, unless it is the last one to try
+_MIN_RATIO = 1.5  # if smallest gap proved / largest gap not proved is less, no gap between them is worth the time
+_TIME_SHARE = 0.6  # share of the time left that a gap gets, unless it is the last gap to try
 
 
 def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | None = None) -> Solution:
-    """Prove a bound that no design of the box can beat; returns the design with it, or a better design if one is found.
+    """Prove a bound on the objective of every design in the box; return the design with this bound.
 
-    SCIP decides whether any design is better than this one by a gap; if none is, that is the bound. The proof is in
-    floating-point arithmetic, to SCIP's feasibility tolerance. For an infeasible problem it proves the infeasibility.
-    It does not support the robustness radius.
+    SCIP decides whether any design is better than this one by more than a gap. If none is, the gap gives the bound. If
+    SCIP finds a better design, the result is that design. The proof is in floating-point arithmetic, to SCIP's
+    feasibility tolerance. For an infeasible problem, it is a proof that no design is feasible. The robustness radius is
+    not supported.
 
     Args:
-        design: a result of `solve`, also one that is not optimal (throw=False); or a problem or its file, solved first.
+        design: a result of `solve`, which need not be optimal (throw=False); or a problem or its file, solved first.
         seconds: time limit of the whole proof.
         progress: called with a `tmsopt.Progress` now and then; its note has the best value and the proved gap.
 
@@ -73,10 +74,10 @@ def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | Non
         clock = Clock(seconds, pool, steps)
         try:
             begin(steps, "bounding the optimum", "s")
-            has_better = True
-            while has_better and not (problem.objective is None and is_feasible(solution)):
+            is_improved = True
+            while is_improved and not (problem.objective is None and is_feasible(solution)):
                 take_step = _bound_feasible if is_feasible(solution) else _prove_infeasible
-                solution, has_better = take_step(solution, clock)
+                solution, is_improved = take_step(solution, clock)
         except UnsupportedOperation as error:
             return _note_failure(solution, f"no bound: branch and bound does not support {error}")
         except SolverFailed as error:
@@ -92,14 +93,14 @@ def check_installed() -> None:
     """Check that the global solver is installed.
 
     Raises:
-        InputError: if it is not; says what to install.
+        InputError: if it is not; the message says what to install.
     """
-    if not SOLVER.available:
-        raise InputError([Fault(SOLVER.missing, ("certify",))])
+    if not SOLVER.is_available:
+        raise InputError([Fault(SOLVER.install_message, ("certify",))])
 
 
 def _bound_feasible(design: Solution, clock: Clock) -> tuple[Solution, bool]:
-    """Prove the smallest gap of a feasible design; returns it, or a better design and True."""
+    """Prove the smallest gap of a feasible design. Return (the design, False), or (a better design, True)."""
     known_bound = _instant_bound(design)
     if known_bound.proven:
         return replace(design, bound=known_bound), False
@@ -111,13 +112,13 @@ def _bound_feasible(design: Solution, clock: Clock) -> tuple[Solution, bool]:
     proved_level, failed_level = math.inf, 0.0
     has_converged = design.status == "optimal"
     while (level := _next_level(proved_level, failed_level, has_converged)) is not None and clock.seconds_left > 0:
-        share = 1.0 if level in (_FINE_LEVEL, _COARSE_LEVELS[-1]) else _SHARE
+        share = 1.0 if level in (_FINE_LEVEL, _COARSE_LEVELS[-1]) else _TIME_SHARE
         clock.note = _progress_note(design, min(known_bound.gap, _gap(design.value, proved_level)), level)
         confirm = partial(confirm_point, design, _cases(design))
-        reply = answer_question(_pose_question(design, level), clock, share, confirm)
-        if reply.better is not None:
-            return reply.better, True
-        if reply.verdict == INFEASIBLE:
+        answer = answer_question(_pose_question(design, level), clock, share, confirm)
+        if answer.better_solution is not None:
+            return answer.better_solution, True
+        if answer.verdict == INFEASIBLE:
             proved_level = level
         else:
             failed_level = level
@@ -126,7 +127,7 @@ def _bound_feasible(design: Solution, clock: Clock) -> tuple[Solution, bool]:
 
 
 def _progress_note(design: Solution, gap: float, level: float) -> str:
-    """The progress note: the gap proved, the best value and the gap tried next."""
+    """Write the progress note: the gap proved, the bound, the best value and the gap tried next."""
     bound = design.value - design.problem.posed.sign * gap
     bound_text = f"gap {gap:.2g}, bound {bound:.6g}" if math.isfinite(gap) else "no bound"
     return f"{bound_text}, best {design.value:.6g}; trying gap {_gap(design.value, level):.2g}"
@@ -149,15 +150,15 @@ def _next_level(proved_level: float, failed_level: float, has_converged: bool) -
 
 
 def _prove_infeasible(design: Solution, clock: Clock) -> tuple[Solution, bool]:
-    """Prove that no design is feasible; returns the result, or a feasible design and True."""
+    """Prove that no design is feasible. Return (the infeasible design, False), or (a feasible design, True)."""
     if design.bound.proven:
         return design, False
     clock.note = "looking for a feasible design"
     problem, cases = design.problem.posed, _cases(design)
-    reply = answer_question(_pose_question(design, None), clock, 1.0, partial(confirm_point, design, cases))
-    if reply.better is not None:
-        return reply.better, True
-    if reply.verdict == INFEASIBLE:
+    answer = answer_question(_pose_question(design, None), clock, 1.0, partial(confirm_point, design, cases))
+    if answer.better_solution is not None:
+        return answer.better_solution, True
+    if answer.verdict == INFEASIBLE:
         if not recheck(problem, design.parameters, cases).violations:
             reason = f"no proof: {SOLVER.name}'s relaxation excludes a known feasible design"
             return _note_failure(design, reason), False
@@ -168,7 +169,7 @@ def _prove_infeasible(design: Solution, clock: Clock) -> tuple[Solution, bool]:
 
 
 def _instant_bound(design: Solution) -> Bound:
-    """Compute the bound without a search again; a damping ratio is at most 1, a frequency at least 0."""
+    """Return the best bound that needs no search; a damping ratio is at most 1, a frequency at least 0."""
     problem, value = design.problem.posed, design.value
     if problem.sign < 0 and problem.goal == "damping_ratio":
         gap = max(1.0 - value, 0.0)
@@ -182,13 +183,13 @@ def _instant_bound(design: Solution) -> Bound:
 
 
 def _interval_bound(design: Solution) -> Bound:
-    """The bound by interval arithmetic of an objective that does not depend on the roots."""
+    """Bound an objective that does not depend on the roots by interval arithmetic."""
     problem = design.problem.posed
     if problem.objective is None or set(problem.objective.names) & set(ROOT_NAMES) or not math.isfinite(design.value):
         return Bound()
     build = Builder(problem, _cases(design))
     build.add_objective()
-    lower, upper = build.enclose([build.objective])[0]  # of the negative objective if it is maximised
+    lower, upper = build.enclose([build.objective])[0]  # of minus the objective if it is maximised
     gap = max(problem.sign * design.value - lower, 0.0)
     return (
         Bound(problem.sign * lower, gap, gap == 0, "interval") if math.isfinite(lower) and upper >= lower else Bound()
@@ -211,7 +212,7 @@ def _proved_bound(design: Solution, level: float, clock: Clock) -> Bound:
 
 
 def _search_bound(value: float, gap: float, proven: bool, clock: Clock) -> Bound:
-    """A bound with the solver, its time and its nodes."""
+    """Make a bound with the name of the solver, its time and its nodes."""
     name = SOLVER.name
     return Bound(value, gap, proven, name.lower(), clock.seconds_used, clock.nodes, SOLVER.tolerance, name)
 
@@ -239,7 +240,7 @@ def _cases(design: Solution) -> tuple[Case, ...]:
 
 
 def _note_failure(design: Solution, text: str) -> Solution:
-    """Add a note, and the solver's name to the bound; more time would not help."""
+    """Add a note on why there is no proof, and add the solver's name to the bound; more time would not help."""
     return replace(_add_note(design, text), bound=replace(design.bound, solver=SOLVER.name))
 
 

@@ -1,6 +1,6 @@
 """Proves that an exact design with a root pattern exists near a stored one, and that the stored one is its rounding.
 
-Ball arithmetic stands for a number by a ball: a midpoint and a radius around it that certainly hold the number.
+Ball arithmetic represents a number by a ball: an interval with a midpoint and a radius that certainly contains it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,7 +23,7 @@ EXACT = "exact factorisation"
 """The method for a design whose coefficients are fractions."""
 
 _EXTRA_DIGITS = 25  # decimal digits of the arithmetic beyond the requested ones
-_ATTEMPTS = 3  # each attempt computes with twice the digits of the previous one
+_MAX_ATTEMPTS = 3  # each attempt computes with twice the digits of the previous one
 _END_DISTANCE = 1e-9  # relative to its range: a parameter closer to an end counts as at that end
 
 
@@ -39,8 +39,9 @@ class ProvedDesign:
         uniqueness: distance within which no other solution exists, in each moved parameter and each unknown; inf if no
             parameter is moved.
         radius: the largest radius of the balls.
-        distance: from the stored design, in the parameter with the largest distance relative to `explained`.
-        explained: the distance that rounding explains in that parameter.
+        distance: how far the stored value of a parameter is from the proved one, for the parameter with the largest
+            ratio of this distance to the distance that rounding explains.
+        explained: the distance that rounding explains for this parameter.
     """
 
     method: str
@@ -57,7 +58,7 @@ class ProvedDesign:
 
 
 def prove_exactly(problem: Posed, pattern: Pattern, design: ExactDesign) -> ProvedDesign | None:
-    """Prove the stored design by exact factorisation; None if its numbers are no fractions or lack the pattern."""
+    """Prove the stored design by exact factorisation; None unless it has fractions and the pattern."""
     proved_design = enclose_stored(problem, design)
     if proved_design is None or proved_design.method != EXACT or any(c.equality for c in problem.conditions.values()):
         return None
@@ -65,7 +66,7 @@ def prove_exactly(problem: Posed, pattern: Pattern, design: ExactDesign) -> Prov
 
 
 def enclose_stored(problem: Posed, design: ExactDesign) -> ProvedDesign | None:
-    """Enclose the roots of the stored design in balls, whatever their pattern; None if a0 may be 0."""
+    """Enclose the roots of the stored design in balls, for any pattern; None if a0 may be 0."""
     balls, parameter_set = design.balls(), problem.parameter_set
     tangents = {n: x for n, x in _exact_numbers(problem, design).items() if parameter_set[n].tangent}
     exact_coefficients = design.coefficients(problem.model, parameter_set)
@@ -89,7 +90,7 @@ def prove_nearby(
         ProofFailed: if the proof fails; the message gives the reason.
     """
     system, working_digits = build_equations(problem, pattern, stored_values), digits + _EXTRA_DIGITS
-    for _ in range(_ATTEMPTS):
+    for _ in range(_MAX_ATTEMPTS):
         with flint.ctx.workdps(working_digits):
             proved_design = _search_nearby(system, design, stored_values, working_digits - _EXTRA_DIGITS // 2)
             tolerance = flint.arb(10) ** -(digits + GUARD)
@@ -108,20 +109,20 @@ def _search_nearby(
     exact_values = _exact_numbers(problem, design)
     free_names = [n for n in problem.free if n not in {s.removeprefix("tan(").removesuffix(")") for s in design.stated}]
     reasons: list[str] = []
-    for candidates in _parameter_choices(problem, stored_values, free_names, system.conditions):
+    for candidates in _parameter_choices(problem, stored_values, free_names, system.condition_count):
         for unknowns in _start_values(system, exact_values):
             start = {**exact_values, **unknowns}
             try:
                 return _prove_from(system, start, candidates, digits)
-            except ProofFailed as refusal:
-                reasons.append(str(refusal))
+            except ProofFailed as failure:
+                reasons.append(str(failure))
     raise ProofFailed(reasons[0] if reasons else f"no {pattern.name} found near the design")
 
 
 def _parameter_choices(
     problem: Posed, stored_values: Mapping[str, float], free_names: list[str], count: int
 ) -> Iterator[list[str]]:
-    """Yield choices of parameters to move: first only those inside their ranges, to keep the design in the box."""
+    """Yield choices of parameters to move: first those inside their ranges, to keep the design in the box."""
     ends = {n: problem.free[n] for n in free_names}
     inner_names = [
         n
@@ -148,7 +149,7 @@ def _start_values(system: Equations, exact_values: Mapping[str, Any]) -> Iterato
     try:
         fits = fit_unknowns(system.pattern, coefficients)
     except ValueError:
-        raise ProofFailed("a0 is 0, or a coefficient does not exist: a root is at infinity") from None
+        raise ProofFailed("a0 is 0, or a coefficient is not finite: a root is at infinity") from None
     for fit in fits[:2]:
         units = (system.units.get(n, 1.0) for n in system.pattern_unknowns)
         yield lifted | {n: flint.arb(x * u) for n, x, u in zip(system.pattern_unknowns, fit, units, strict=True)}
@@ -161,23 +162,23 @@ def _prove_from(system: Equations, start: Mapping[str, Any], candidates: list[st
     names = [*choice.moved, *system.unknowns]
     middle = refine_solution(system, start, names, digits, system.units)
     enclosure = enclose_solution(system, middle, names, digits, system.units)
-    at = {**middle, **enclosure.balls}
+    solution = {**middle, **enclosure.balls}
     distance, explained = _measure_distance(choice, start, enclosure, system.units)
-    tangents = {n: at[n] for n in parameter_set.names if parameter_set[n].tangent}
-    parameters = {n: at[n].atan() if n in tangents else at[n] for n in parameter_set.names}
+    tangents = {n: solution[n] for n in parameter_set.names if parameter_set[n].tangent}
+    parameters = {n: solution[n].atan() if n in tangents else solution[n] for n in parameter_set.names}
     coefficients = system.problem.model.coefficients(parameters, parameter_set)
-    unknowns = [at[n] for n in system.pattern_unknowns]
-    _check_solution(system, coefficients, at)
+    unknowns = [solution[n] for n in system.pattern_unknowns]
+    _check_solution(system, coefficients, solution)
     return ProvedDesign(
         "Krawczyk",
         coefficients,
         parameters,
         tangents,
-        {n: at[n] for n in system.unknowns},
+        {n: solution[n] for n in system.unknowns},
         factor_pattern(system.pattern, unknowns),
         choice.moved,
         enclosure.uniqueness * min((system.units.get(n, 1.0) for n in names), default=1.0),
-        largest_radius([at[n] for n in names]),
+        largest_radius([solution[n] for n in names]),
         distance,
         explained,
     )
@@ -186,34 +187,35 @@ def _prove_from(system: Equations, start: Mapping[str, Any], candidates: list[st
 def _measure_distance(
     choice: MovedParameters, start: Mapping[str, Any], enclosure: Enclosure, units: Mapping[str, float]
 ) -> tuple[float, float]:
-    """Measure the distance of the stored design from the proved one, and the distance that rounding explains.
+    """Measure `distance` and `explained` of `ProvedDesign`.
 
     Raises:
-        ProofFailed: if rounding does not explain the distance, or if it could leave the box in which the solution is
-            unique. Next to an EP4, for example, the last bit of a stored number would select one of many EP3s.
+        ProofFailed: if rounding does not explain the distance, or if rounding could move the design out of the box in
+            which the solution is unique. Next to an EP4, for example, the last bit of a number selects one of many EP3.
     """
     explained = choice.explained
     distances = {n: upper(abs(enclosure.balls[n] - start[n])) for n in choice.moved}
-    reach = {n: enclosure.uniqueness * units.get(n, 1.0) for n in explained}
-    weakest = max(explained, key=lambda n: explained[n] / reach[n], default=None)
-    if weakest and not explained[weakest] < reach[weakest]:
+    unique_distances = {n: enclosure.uniqueness * units.get(n, 1.0) for n in explained}
+    critical_name = max(explained, key=lambda n: explained[n] / unique_distances[n], default=None)
+    if critical_name and not explained[critical_name] < unique_distances[critical_name]:
         raise ProofFailed(
-            f"nearly singular: rounding alone moves {weakest} by {explained[weakest]:.2g}, but the solution is unique "
-            f"only within {reach[weakest]:.2g}; hold another parameter, or give exact numbers"
+            f"nearly singular: rounding alone moves {critical_name} by {explained[critical_name]:.2g}, but the "
+            f"solution is unique only within {unique_distances[critical_name]:.2g}; hold another parameter, or give "
+            "exact numbers"
         )
-    farthest = max(distances, key=lambda n: distances[n] / explained[n], default=None)
-    if farthest is None:
+    farthest_name = max(distances, key=lambda n: distances[n] / explained[n], default=None)
+    if farthest_name is None:
         return 0.0, 0.0
-    if distances[farthest] > explained[farthest]:
+    if distances[farthest_name] > explained[farthest_name]:
         raise ProofFailed(
-            f"not the design's: the nearest one is {distances[farthest]:.2g} from the stored {farthest}; rounding "
-            f"explains only {explained[farthest]:.2g} ({ROUNDINGS} roundings of each number); solve again, "
-            "or give all digits"
+            f"the solution found is not the stored design: {farthest_name} differs by {distances[farthest_name]:.2g}, "
+            f"but rounding explains only {explained[farthest_name]:.2g} ({ROUNDINGS} roundings of each number); "
+            "solve again, or give all digits"
         )
-    return distances[farthest], explained[farthest]
+    return distances[farthest_name], explained[farthest_name]
 
 
-def _check_solution(system: Equations, coefficients: Sequence[Any], at: Mapping[str, Any]) -> None:
+def _check_solution(system: Equations, coefficients: Sequence[Any], solution: Mapping[str, Any]) -> None:
     """Check the conditions that are not equations.
 
     Raises:
@@ -224,11 +226,11 @@ def _check_solution(system: Equations, coefficients: Sequence[Any], at: Mapping[
             "a0 may be 0: a root may be at infinity, and a polynomial with all a = 0 meets every equation"
         )
     for quantity in system.lifted:
-        r, x = quantity.range, at[quantity.name]
+        r, x = quantity.range, solution[quantity.name]
         if not (x >= r.lower and x <= r.upper):
             raise ProofFailed(f"the solution found has {quantity.name} = {float(x):.6g}, outside its range {r}")
     pattern = system.pattern
-    for value in pattern.nonnegative([at[n] for n in system.pattern_unknowns]):
+    for value in pattern.nonnegative([solution[n] for n in system.pattern_unknowns]):
         if value < 0:
             raise ProofFailed(_other_kind(pattern))
         if not value > 0:

@@ -18,7 +18,7 @@ Factor = Sequence[Any]
 
 @dataclass(frozen=True)
 class Factorisation:
-    """Distinct factors with their multiplicities."""
+    """A polynomial as a product of distinct factors: (factor, multiplicity) for each."""
 
     factors: tuple[tuple[Factor, int], ...]
 
@@ -38,17 +38,17 @@ class Factorisation:
     @cached_property
     def abscissa(self) -> Any:
         """The largest real part; None if a factor leaves it undecided."""
-        return _extreme(flint.arb.max, [_rightmost(factor) for factor, _ in self.factors])
+        return _choose_extreme(flint.arb.max, [_rightmost(factor) for factor, _ in self.factors])
 
     @cached_property
     def damping_ratio(self) -> Any:
         """The least −Re s/|s|; None if undecided."""
-        return _extreme(flint.arb.min, [_damping_ratio(z) for z in self.roots or ()])
+        return _choose_extreme(flint.arb.min, [_damping_ratio(z) for z in self.roots or ()])
 
     @cached_property
     def angular_frequency(self) -> Any:
         """The greatest imaginary part; None if the balls of two roots overlap."""
-        return _extreme(flint.arb.max, [z.im for z in self.roots or ()])
+        return _choose_extreme(flint.arb.max, [z.im for z in self.roots or ()])
 
     @cached_property
     def stable(self) -> bool | None:
@@ -73,7 +73,7 @@ def factor_pattern(pattern: Pattern, unknowns: Sequence[Any]) -> Factorisation:
 
 
 def abscissa_formula(pattern: Pattern, unknowns: Sequence[Any]) -> Any:
-    """The largest real part, from the factor with the rightmost root; nan if undecided."""
+    """The largest real part of the roots of a pattern, from the factor with the rightmost root; nan if undecided."""
     formulas = [_abscissa_formula(factor) for factor, _ in factor_pattern(pattern, unknowns).factors]
     if any(f is None for f in formulas):
         return flint.arb("nan")
@@ -81,7 +81,7 @@ def abscissa_formula(pattern: Pattern, unknowns: Sequence[Any]) -> Any:
 
 
 def _abscissa_formula(factor: Factor) -> Any:
-    """The largest real part of the roots of a factor, as a ball or a series; None if their balls overlap."""
+    """The largest real part of the roots of a factor, as a ball or a series; None if the balls of two roots overlap."""
     constants = [_centre(c) for c in factor]
     roots = factor_roots(constants)
     if roots is None:
@@ -103,12 +103,12 @@ def _rightmost(factor: Factor) -> Any:
         discriminant = b * b - 4 * c
         if not (discriminant > 0 or discriminant < 0):
             return (discriminant.nonnegative_part().sqrt() - b) / 2
-    return _extreme(flint.arb.max, [z.re for z in factor_roots(factor) or ()])
+    return _choose_extreme(flint.arb.max, [z.re for z in factor_roots(factor) or ()])
 
 
-def _extreme(which: Callable[[Any, Any], Any], balls: Sequence[Any]) -> Any:
-    """The greatest or the least ball; None if there is none or one is None."""
-    return reduce(which, balls) if balls and None not in balls else None
+def _choose_extreme(choose: Callable[[Any, Any], Any], balls: Sequence[Any]) -> Any:
+    """Choose the greatest or the least ball; None if the list is empty or has a None."""
+    return reduce(choose, balls) if balls and None not in balls else None
 
 
 def _damping_ratio(root: EnclosedRoot) -> Any:
@@ -137,9 +137,9 @@ def _monic(part: Any) -> Factor:
 
 
 def has_pattern(pattern: str, coefficients: Sequence[Any]) -> bool:
-    """Whether a polynomial with fractions has a pattern exactly; roots of other multiplicities are allowed.
+    """Whether a polynomial with fractions has a pattern exactly; other multiple roots are allowed.
 
-    Weave and resonance hold if the even and the odd part of the polynomial share a root s² < 0.
+    Weave and resonance need a common root s² < 0 of the even and the odd part of the polynomial.
     """
     try:
         components = composition(pattern)

@@ -23,7 +23,7 @@ class Verdict:
 
     Attributes:
         holds: True or False if it is certain; None if it is undecided or was not checked.
-        words: the fact, or the reason why it is undecided.
+        words: the fact, or the reason why the fact is undecided.
     """
 
     holds: bool | None = None
@@ -32,7 +32,7 @@ class Verdict:
 
 NOT_CHECKED = Verdict()
 
-# A root, several roots, the unstable side, the stable side, and the stable side in short.
+# In this order: one root, several roots, the unstable side, the stable side, the stable side in short.
 _ROOT_WORDS = "a root", "roots", "right of the imaginary axis", "left of the imaginary axis", "left of the axis"
 _EIGENFREQUENCY_WORDS = (
     "an eigenfrequency",
@@ -42,8 +42,8 @@ _EIGENFREQUENCY_WORDS = (
     "below the axis",
 )
 
-BINDS = 1e-9
-"""A comparison binds if its sides differ by at most this; a solver leaves such remainders."""
+BINDING_TOLERANCE = 1e-9
+"""A comparison binds if its sides differ by at most this; a solver leaves differences of this size."""
 
 
 def eigenvector_verdict(problem: Posed, design: ExactDesign, proved_design: ProvedDesign) -> tuple[int | None, Verdict]:
@@ -63,9 +63,9 @@ def eigenvector_verdict(problem: Posed, design: ExactDesign, proved_design: Prov
         parts = flint.fmpq_poly(list(proved_design.coefficients)[::-1]).factor()[1]
         nullities = [(exact_nullity(matrices, part), int(count)) for part, count in parts if count > 1]
         largest_nullity = max(nullity for nullity, _ in nullities)
-        defective = all(nullity < count for nullity, count in nullities)
+        is_defective = all(nullity < count for nullity, count in nullities)
         return largest_nullity, Verdict(
-            defective, f"{largest_nullity} eigenvector{'s' * (largest_nullity > 1)}, in fractions"
+            is_defective, f"{largest_nullity} eigenvector{'s' * (largest_nullity > 1)}, in fractions"
         )
     matrices_at = pencil(parameter_set.native(proved_design.parameters))
     roots = [flint.acb(z.re, z.im) for f in repeated_factors for z in factor_roots(f) or ()]
@@ -82,7 +82,7 @@ def stability_verdict(factorisation: Factorisation, of_H: bool = False) -> Verdi
     """Whether all roots lie left of the imaginary axis, by Liénard–Chipart signs in balls.
 
     Args:
-        of_H: word the verdict for eigenfrequencies ω = i s.
+        of_H: whether the roots s belong to a complex H; the words are then about its eigenfrequencies ω = i s.
     """
     subject, subjects, unstable_side, stable_side, inside = _EIGENFREQUENCY_WORDS if of_H else _ROOT_WORDS
     if factorisation.stable:
@@ -155,20 +155,21 @@ def limit_verdicts(problem: Posed, proved_design: ProvedDesign) -> dict[str, str
     for name, condition in problem.conditions.items():
         difference = flint.arb(condition.of(values, BALLS))
         if condition.equality:
-            verdicts[name] = _equality_verdict(difference, equations=proved_design.method == "Krawczyk")
+            verdicts[name] = _equality_verdict(difference, is_solved=proved_design.method == "Krawczyk")
         else:
             verdicts[name] = _inequality_verdict(difference if condition.sign < 0 else -difference)
     return verdicts
 
 
-def _equality_verdict(difference: Any, equations: bool) -> str:
-    if difference == 0 or (equations and difference.contains(0)):
+def _equality_verdict(difference: Any, is_solved: bool) -> str:
+    """The verdict on an equality; `is_solved` tells whether it is one of the equations that the proof has solved."""
+    if difference == 0 or (is_solved and difference.contains(0)):
         return "met"
     verdict = "not decided" if not difference.is_finite() else f"met but for {abs(float(difference.mid())):.1e}"
-    return verdict if abs(difference) <= BINDS or not difference.is_finite() else "violated"
+    return verdict if abs(difference) <= BINDING_TOLERANCE or not difference.is_finite() else "violated"
 
 
-def _inequality_verdict(room: Any) -> str:
-    if abs(room) <= BINDS:
+def _inequality_verdict(margin: Any) -> str:
+    if abs(margin) <= BINDING_TOLERANCE:
         return "binds"
-    return "met" if room > 0 else "violated" if room < 0 else "not decided"
+    return "met" if margin > 0 else "violated" if margin < 0 else "not decided"

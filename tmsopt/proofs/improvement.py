@@ -16,23 +16,23 @@ from tmsopt.search.solve import evaluate_design, solve
 MIN_SIZE = 0.1
 """Gains are relative to the size of the objective, or to this number if the objective is smaller."""
 
-_MIN_GAIN = 1e-7  # relative: a tenth of the smallest gap that `certify` tries
-_CERTAIN_GAIN = 1e-2  # relative: a violation of 1e-9 gains at most 0.006, at a 4-fold root
+_MIN_GAIN = 1e-7  # relative gain of a better design: a tenth of the smallest gap that `certify` tries
+_CERTAIN_GAIN = 1e-2  # a larger relative gain is real: a violation of 1e-9 gains at most 0.006, at a 4-fold root
 _STARTS = 4  # starts of the solver: the point and three others
-_MAX_VIOLATION = 1e-3  # a point with a larger violation or a larger loss is rejected
+_MAX_VIOLATION = 1e-3  # a point with a larger violation, or a larger relative loss, is rejected
 
 
 def is_feasible(design: Solution) -> bool:
     """Whether a solution meets all constraints, optimal or not."""
-    valued = design.problem.posed.objective is None or math.isfinite(design.value)
-    return design.status == "optimal" or (design.status == "not_converged" and not design.violations and valued)
+    has_value = design.problem.posed.objective is None or math.isfinite(design.value)
+    return design.status == "optimal" or (design.status == "not_converged" and not design.violations and has_value)
 
 
 def confirm_point(design: Solution, cases: Sequence[Case], point: Mapping[str, float]) -> Answer:
     """Solve from a point that branch and bound found, for a better design than the known one.
 
-    If the solver does not converge, the feasible design nearest to the point may still be better. A point gives no
-    design if it is better only because it violates a limit within the solver's tolerance, or because cases are missing.
+    If the solver does not converge, the feasible design nearest to the point may still be better. There is no better
+    design if the point only gains by violating a limit within the solver's tolerance, or by ignoring cases.
     """
     problem = design.problem.posed
     known_value = design.value if is_feasible(design) and problem.objective is not None else None
@@ -54,7 +54,7 @@ def confirm_point(design: Solution, cases: Sequence[Case], point: Mapping[str, f
             )
             notes = (*candidate.notes, note)
             better = replace(candidate, problem=problem.problem, notes=notes, stable_elsewhere=design.stable_elsewhere)
-            return Answer(FOUND, better=better)
+            return Answer(FOUND, better_solution=better)
     return Answer(FOUND if known_value is not None and gain > _MIN_GAIN and not evaluation.violations else UNDECIDED)
 
 
@@ -65,7 +65,7 @@ def _improve_point(
     yield _solve(problem, near=point)
     note = "the solver does not converge from the design that branch and bound found, or converges to a worse one"
     point_design = evaluate_design(problem, point, note)
-    if relative_gain(problem, known_value, point_design.value) <= _MIN_GAIN:  # the value includes the worst cases
+    if relative_gain(problem, known_value, point_design.value) <= _MIN_GAIN:  # this value includes the worst cases
         return
     yield _solve(problem.derive(start=point))
     ranges = [f"(({n} - ({point[n]!r})) / {hi - lo!r})**2" for n, (lo, hi) in problem.free.items()]

@@ -1,4 +1,4 @@
-"""Proves that the design exists which a problem asks for: solves the problem first, then proves."""
+"""Proves that the design that a problem asks for exists. Solves the problem first."""
 
 import math
 import time
@@ -64,7 +64,7 @@ class Proof(Printable):
         pattern: the root pattern, ``pair`` or ``real``.
         method: ``Krawczyk``, ``exact factorisation``, ``isolated roots`` or ``none``.
         digits: number of digits requested.
-        stored: whether all numbers below describe the design as stored, because the claim is about it or not proved.
+        stored: whether all numbers below describe the stored design, because the claim is about it or is not proved.
         parameters: every parameter of the proved design (rad, SI units).
         tangents: tangents of its angles, in which the equations are solved.
         unknowns: factor coefficients of the pattern, and quantities with an equation of their own.
@@ -73,14 +73,17 @@ class Proof(Printable):
         stated: the held numbers that the user gave exactly.
         numbers: non-integers in formulas, as written; each stands for its decimal.
         radius: the largest radius among the numbers solved for.
-        uniqueness: distance within which no other solution exists, in each number solved for; inf if there is none.
-        distance: from the stored design, in the parameter with the largest distance relative to `explained`.
-        explained: how far rounding of the stored numbers may move that parameter.
-        roots: with exact multiplicities, rightmost first; empty if the balls of two overlap.
-        eigenfrequencies: of a complex system, ω = i s, in the order of the roots.
+        uniqueness: distance within which no other solution exists, in each number solved for; inf if no number was
+            solved for.
+        distance: how far the stored value of a parameter is from the proved one, for the parameter with the largest
+            ratio of this distance to the distance that rounding explains.
+        explained: how far rounding of the stored numbers may move this parameter.
+        roots: all roots with exact multiplicities, rightmost first; empty if the balls of two roots overlap.
+        eigenfrequencies: ω = i s of a complex system, in the order of the roots.
         abscissa: the largest real part.
         geometric_multiplicity: the most independent eigenvectors of a multiple root; None if unknown.
-        defective: whether every multiple root has fewer eigenvectors than its multiplicity; an exceptional point has 1.
+        defective: whether every multiple root has fewer eigenvectors than its multiplicity; at an exceptional point it
+            has one.
         stable: whether all roots lie left of the imaginary axis.
         heavily_damped: whether all roots are real and negative.
         inside: whether the proved design lies in the problem's box.
@@ -146,20 +149,20 @@ def prove(
 ) -> Proof:
     """Prove in ball arithmetic that the design a problem asks for exists, and decide its stability.
 
-    An interval Newton test (Krawczyk) on a_k = a0 c_k and the problem's equalities proves that exactly one solution
-    lies within a stated radius, and that the stored numbers are its rounding. `Proof.reason` tells why a proof fails;
-    nothing is guessed.
+    The equations are a_k = a0 c_k, where c_k are the coefficients of the pattern, and the problem's equalities. An
+    interval Newton test (Krawczyk) proves that they have exactly one solution within a stated radius, and that the
+    stored numbers are its rounding. If the proof fails, `Proof.reason` says why.
 
     Args:
         design: a solution; or a problem or its file, solved first.
         digits: number of digits of every result, 1 to 1000.
         exact: parameter, or ``tan(lambda_s)`` → its exact value: an int, a Fraction, a ``flint.fmpq``, or text such as
             ``"-2/5"`` or ``"20 deg"``. Other numbers stand for the shortest decimals that print them.
-        options: options of `solve`, e.g. ``starts``; with a solution ``progress`` only.
+        options: options of `solve`, e.g. ``starts``; with a solution, only ``progress``.
 
     Raises:
-        InputError: if the problem has no objective or pattern, options come with a solution, `digits` is out of range,
-            or exact numbers differ from the design's.
+        InputError: if the problem has no objective or pattern, a solution comes with other options than ``progress``,
+            `digits` is out of range, or exact numbers differ from the design's.
 
     Example:
         >>> tmsopt.prove("problems/ep4.toml", digits=40).parameters["chi_B"].value[:42]  # the square root of 2
@@ -167,11 +170,10 @@ def prove(
 
     More: docs/explanation/proofs.md
     """
-    rejected = [name for name in options if name != "progress"]
-    if isinstance(design, Solution) and rejected:
-        message = (
-            f"found {', '.join(rejected)}; accepted with a solution: progress; to set solver options, give the problem"
-        )
+    rejected_options = [name for name in options if name != "progress"]
+    if isinstance(design, Solution) and rejected_options:
+        found = f"found {', '.join(rejected_options)}"
+        message = f"{found}; accepted with a solution: progress; to set solver options, give the problem"
         raise InputError([Fault(message, ("options",))])
     solve_options = make_options(options, SolveOptions)
     solution = solve_any_status(design, solve_options)
@@ -220,7 +222,7 @@ def prove_design(
     design = as_exact_design(problem.parameter_set, case_parameters, exact, typed_texts)
     with flint.ctx.workdps(2 * digits + _EXTRA_DIGITS):
         patterns = _candidate_patterns(problem, structure, roots)
-        # Constraints hold for the nominal design or for every case, so those of a single case are dropped.
+        # Constraints belong to the nominal design or to all cases, so a proof for a single case drops them.
         claim_problem = problem.nominal.derive(constraints={}) if case and (case.at or case.offset) else problem
         proof = _prove_first(claim_problem, design, case_parameters, structure, patterns, digits)
         return replace(proof, problem=problem.problem, seconds=time.perf_counter() - began)
@@ -242,8 +244,8 @@ def _prove_first(
     for pattern in patterns:
         try:
             proved_design = prove_nearby(problem, pattern, design, case_parameters, digits)
-        except ProofFailed as refusal:
-            reasons.append(str(refusal))
+        except ProofFailed as failure:
+            reasons.append(str(failure))
         else:
             return _assemble(problem, design, pattern.name, pattern, proved_design, digits)
     name = problem.locate or user_structure_name(problem.model, structure)
@@ -277,7 +279,7 @@ def _exact_patterns(problem: Posed, design: ExactDesign) -> list[Pattern]:
 
 
 def _simple_doubts(problem: Posed, structure: str, proved_design: ProvedDesign) -> list[str]:
-    """Say why the structure of a design without multiple roots is not proved; empty if it is proved."""
+    """List why the structure of a design without multiple roots is not proved; empty if it is proved."""
     pattern_name = user_structure_name(problem.model, structure)
     if structure not in _SIMPLE_CLAIMS:
         return [f"double precision cannot decide the structure {pattern_name}; locate the pattern you expect"]
@@ -309,11 +311,12 @@ def _assemble(
     }
     abscissa = proved_design.factorisation.abscissa
     is_real = problem.model.carrier is None
-    hidden_unknowns = () if is_real or pattern is None else pattern.unknowns  # the unknowns of the real double of H
+    # For a complex H, these are unknowns of a real matrix that the user did not state.
+    hidden_unknowns = () if is_real or pattern is None else pattern.unknowns
     hidden_unknowns = (*hidden_unknowns, *(f"{pattern.name}.{n}" for n in hidden_unknowns)) if pattern else ()
     roots = user_roots(problem.model, proved_design.factorisation.roots or ())
-    geometric, defective = eigenvector_verdict(problem, design, proved_design)
-    if not reasons and geometric is not None and geometric > 1 and "EP" in name:
+    geometric_multiplicity, defective = eigenvector_verdict(problem, design, proved_design)
+    if not reasons and geometric_multiplicity is not None and geometric_multiplicity > 1 and "EP" in name:
         reasons = [f"{'not an EP' if defective.holds else CROSSING}: {defective.words}"]
     return Proof(
         claim=_state_claim(name, pattern),
@@ -341,7 +344,7 @@ def _assemble(
             ProvedRoot(number(-z.im, digits), number(z.re, digits), z.multiplicity) for z in (() if is_real else roots)
         ),
         abscissa=None if abscissa is None else number(abscissa, digits),
-        geometric_multiplicity=geometric,
+        geometric_multiplicity=geometric_multiplicity,
         defective=defective,
         stable=stability_verdict(proved_design.factorisation, not is_real),
         heavily_damped=heavy_damping_verdict(proved_design.factorisation) if is_real else NOT_CHECKED,

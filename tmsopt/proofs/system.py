@@ -20,8 +20,8 @@ from tmsopt.roots import Pattern
 ROUNDINGS = 64
 """A stored design may miss an equation by this many roundings of each number."""
 
-_MIN_PIVOT = 1e-9  # relative: a parameter with a smaller pivot depends on the others
-_ZERO_REMAINDER = 1e-30  # relative to a range: remainder that a solver leaves instead of 0
+_MIN_PIVOT = 1e-9  # relative to the largest pivot: the equations do not determine a parameter with a smaller one
+_ZERO_REMAINDER = 1e-30  # relative to a range: a solver may leave a parameter this far from 0
 _MIN_SCALE = 1e-3  # relative to a range: least scale of a parameter
 _EPS = float(np.finfo(float).eps)
 
@@ -35,7 +35,7 @@ class Equations:
 
     Attributes:
         equalities: the == constraints.
-        lifted: quantities in them that are unknowns with an equation.
+        lifted: quantities in these constraints that are unknowns with an equation of their own.
         unit: unit of the roots, a power of 2.
         units: units of the numbers whose size is not about 1, powers of 2.
     """
@@ -54,25 +54,25 @@ class Equations:
 
     @property
     def pattern_unknowns(self) -> tuple[str, ...]:
-        """Names of the unknowns of the pattern, different from those of parameters and quantities."""
+        """Names of the unknowns of the pattern; they differ from the names of parameters and quantities."""
         parameter_set = self.problem.parameter_set
         used_names = {*parameter_set.names, *self.problem.model.quantity_names(parameter_set)}
         return tuple(f"{self.pattern.name}.{u}" if u in used_names else u for u in self.pattern.unknowns)
 
     @property
-    def conditions(self) -> int:
+    def condition_count(self) -> int:
         """Number of conditions on the parameters."""
         return self.pattern.codimension + len(self.equalities)
 
-    def __call__(self, at: Mapping[str, Any]) -> list[Any]:
+    def __call__(self, point: Mapping[str, Any]) -> list[Any]:
         """Compute the left sides."""
-        values = values_at(self.problem, self.lifted, at, {})
-        u = [at[n] for n in self.pattern_unknowns]
+        values = values_at(self.problem, self.lifted, point, {})
+        u = [point[n] for n in self.pattern_unknowns]
         a = values.coefficients
         left_sides = [p - a[0] * c for p, c in zip(a[1:], self.pattern.monic(u)[1:], strict=True)]
         if self.equalities:
             values = values.with_known({"abscissa": abscissa_formula(self.pattern, u)})
-        return left_sides + extra_equations(values, self.lifted, self.equalities, at)
+        return left_sides + extra_equations(values, self.lifted, self.equalities, point)
 
 
 def build_equations(problem: Posed, pattern: Pattern, parameters: Mapping[str, float]) -> Equations:
@@ -105,13 +105,13 @@ class MovedParameters:
     explained: Mapping[str, float]
 
 
-def choose_moved(system: Equations, at: Mapping[str, Any], candidates: Sequence[str]) -> MovedParameters:
-    """Choose the best conditioned free parameters by QR with column pivoting, after projecting out the unknowns.
+def choose_moved(system: Equations, point: Mapping[str, Any], candidates: Sequence[str]) -> MovedParameters:
+    """Choose the free parameters that the equations determine best, by QR with column pivoting without the unknowns.
 
     Raises:
         ProofFailed: if there are too few parameters, or the equations do not determine them.
     """
-    count, parameter_set = system.conditions, system.problem.parameter_set
+    count, parameter_set = system.condition_count, system.problem.parameter_set
     if len(candidates) < count:
         raise ProofFailed(
             f"{_count(count, 'condition')} and {_count(len(candidates), 'free parameter')}: the pattern could not be "
@@ -119,8 +119,8 @@ def choose_moved(system: Equations, at: Mapping[str, Any], candidates: Sequence[
             f"free {count - len(candidates)} more, or give fractions that have the pattern"
         )
     names = [*parameter_set.names, *system.unknowns]
-    jacobian = np.array([[float(e) for e in row] for row in jacobian_of(system, at, names).tolist()])
-    values = np.array([abs(float(at[n])) for n in names])
+    jacobian = np.array([[float(e) for e in row] for row in jacobian_of(system, point, names).tolist()])
+    values = np.array([abs(float(point[n])) for n in names])
     rounding = np.abs(jacobian) @ values + 1e-300
     widths = {n: _MIN_SCALE * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
     units = [system.units.get(n, 1.0) for n in names]
@@ -161,7 +161,7 @@ def choose_moved(system: Equations, at: Mapping[str, Any], candidates: Sequence[
     floors = {n: _ZERO_REMAINDER * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
     solved = zip((*moved_names, *system.unknowns), rounding_effects, strict=True)
     return MovedParameters(
-        moved_names, {n: float(e) + 2 * _EPS * abs(float(at[n])) + floors.get(n, 0.0) for n, e in solved}
+        moved_names, {n: float(e) + 2 * _EPS * abs(float(point[n])) + floors.get(n, 0.0) for n, e in solved}
     )
 
 

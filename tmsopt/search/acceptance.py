@@ -1,6 +1,6 @@
 """Choose the best end of a search, polish it by Newton's method and recheck it.
 
-An *end* is where the solver stopped after one start; a *trial* is an end that is polished and rechecked.
+An *end* is the point where the solver stopped after one start. A *trial* is a `CheckedEnd`: a polished, rechecked end.
 """
 
 import math
@@ -12,11 +12,11 @@ from tmsopt.program.formulate import design_of
 from tmsopt.program.ipopt import make_polisher
 from tmsopt.search.state import CheckedEnd, LocalEnd, SearchState, clip_to_box, same_objective
 
-_CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
+_CONVERGED_STATUSES = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
 
 
 def accept_best(state: SearchState) -> SearchState:
-    """Add to the state the best end: the first to pass the recheck after polishing, or the one that fails it least."""
+    """Add the best end to the state: the first that passes the recheck after polishing, or else the least violating."""
     best, tried_objectives = state.best, list[float]()
     for end in sorted((e for e in state.ends[state.accepted :] if e.feasible), key=lambda end: end.objective):
         equal_count = sum(same_objective(end.objective, x, end.nlp.size, state.tuning.same) for x in tried_objectives)
@@ -28,7 +28,7 @@ def accept_best(state: SearchState) -> SearchState:
         trial = check_end(state, end)
         if best is None or is_better(state.problem, trial, best):
             best = trial
-        if not trial.checked.violations and is_stationary(trial) and claim_matches(state.problem, trial):
+        if not trial.checked.violations and is_stationary(trial) and has_matching_claim(state.problem, trial):
             break
     return replace(state, best=best, accepted=len(state.ends))
 
@@ -48,21 +48,21 @@ def recheck_inside_box(state: SearchState, trial: CheckedEnd) -> CheckedEnd:
 
 def is_sound(problem: Posed, trial: CheckedEnd) -> bool:
     """Whether a trial violates no limit and has the objective that the solver claims."""
-    return not trial.checked.violations and claim_matches(problem, trial) and not _counts_unreached_root(trial)
+    return not trial.checked.violations and has_matching_claim(problem, trial) and not _has_unreached_root(trial)
 
 
 def is_stationary(trial: CheckedEnd) -> bool:
-    """Whether the gradient of the Lagrangian vanishes, whatever IPOPT reports."""
+    """Whether the gradient of the Lagrangian vanishes, even if IPOPT reports a failure."""
     return trial.point.stationarity <= trial.tuning.stationary
 
 
 def has_converged(trial: CheckedEnd) -> bool:
     """Whether the solver's status or the gradient shows an optimum, and the rows of the program hold there."""
-    tuning, optimal = trial.tuning, trial.end.run.status in _CONVERGED or is_stationary(trial)
-    return optimal and (trial.point.violation <= tuning.exact or trial.point.stationarity <= tuning.polished)
+    tuning, is_optimal = trial.tuning, trial.end.run.status in _CONVERGED_STATUSES or is_stationary(trial)
+    return is_optimal and (trial.point.violation <= tuning.exact or trial.point.stationarity <= tuning.polished)
 
 
-def claim_matches(problem: Posed, trial: CheckedEnd) -> bool:
+def has_matching_claim(problem: Posed, trial: CheckedEnd) -> bool:
     """Whether the objective that the solver claims equals that of the recheck."""
     if problem.objective is None:
         return True
@@ -71,25 +71,27 @@ def claim_matches(problem: Posed, trial: CheckedEnd) -> bool:
 
 
 def is_better(problem: Posed, candidate: CheckedEnd, other: CheckedEnd) -> bool:
-    """Whether one trial beats another: by violation first, then by the objective of the recheck.
+    """Whether one trial is better than another: by the violation first, then by the objective of the recheck.
 
-    If the solver claims another objective, the difference counts against the trial. Among equally good trials, one that
-    has converged beats one that has not.
+    If the solver claims another objective, the difference counts against the trial. Among equally good trials, a trial
+    that has converged is better than one that has not.
     """
 
     def rank(trial: CheckedEnd) -> tuple[float, bool, float]:
         claim, value = trial.point.objective, problem.sign * trial.checked.objective
-        doubt = 0.0 if claim_matches(problem, trial) else trial.tuning.doubt * abs(claim - value)
-        objective = claim if math.isnan(value) else value + doubt
-        return sum(trial.checked.violations.values()), _counts_unreached_root(trial), objective
+        penalty = 0.0 if has_matching_claim(problem, trial) else trial.tuning.doubt * abs(claim - value)
+        objective = claim if math.isnan(value) else value + penalty
+        return sum(trial.checked.violations.values()), _has_unreached_root(trial), objective
 
-    (*first, a), (*second, b) = rank(candidate), rank(other)
-    if first == second and same_objective(a, b, candidate.end.nlp.size, candidate.tuning.finer):
+    (*keys, objective), (*other_keys, other_objective) = rank(candidate), rank(other)
+    if keys == other_keys and same_objective(
+        objective, other_objective, candidate.end.nlp.size, candidate.tuning.finer
+    ):
         return has_converged(candidate) and not has_converged(other)
-    return (*first, a) < (*second, b)
+    return (*keys, objective) < (*other_keys, other_objective)
 
 
-def _counts_unreached_root(trial: CheckedEnd) -> bool:
-    """Whether a trial that has not converged is rated by a multiple root that it is only close to."""
+def _has_unreached_root(trial: CheckedEnd) -> bool:
+    """Whether a trial that has not converged has the objective of a multiple root that it only comes close to."""
     ideal, stored, tolerance = trial.checked.structure.abscissa, trial.checked.realised, trial.tuning.claimed
     return not has_converged(trial) and not math.isclose(ideal, stored, rel_tol=tolerance, abs_tol=tolerance)

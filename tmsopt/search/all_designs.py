@@ -31,13 +31,11 @@ MAX_STARTS = 1024
 _DEFAULTS = Options(starts=MAX_STARTS)
 _MIN_STARTS = 48
 _MIN_HITS = 3  # starts that must lead to each solution before the search may end
-_SAME_DESIGN = 1e-7  # of the box: distance below which two designs are one solution
-_OUTSIDE = 1e-9  # of the box: solutions this far outside it still count as inside
+_SAME_DESIGN = 1e-7  # relative to each range: designs that differ less are one solution
+_MAX_OVERSHOOT = 1e-9  # relative to a range: a solution this far outside it still counts as inside
 _STARTS_PER_IPOPT_RUN = 4  # IPOPT finds solutions that Newton's method misses
-_ROUNDING = 1e-15  # smallest relative error bound of a parameter and of the abscissa
-# Standard deviations added to the estimated chance; with `_UNSEEN_EVENTS` the bound has 95 % confidence, for few and
-# for many solutions, equally likely or not.
-_DEVIATIONS = 2.0
+_MIN_ERROR = 1e-15  # smallest relative error bound of a parameter and of the abscissa
+_DEVIATIONS = 2.0  # standard deviations by which the bound exceeds the estimated chance, for 95 % confidence
 _UNSEEN_EVENTS = 3.0  # −ln 5 %: an event seen in none of n starts has a chance below 3/n, with 95 % confidence
 
 
@@ -50,9 +48,9 @@ class Coverage:
         hits: number of starts that led to each solution.
         expected: estimated number of solutions in all, from `hits` (Boender and Rinnooy Kan 1987); not a proof.
         chance: upper bound of the chance that one more start finds a new solution, with 95 % confidence.
-        singular: starts that ended only at designs with the pattern and singular equations: in a continuum of
-            solutions, or where two meet. These are not counted as solutions.
-        crossings: starts that ended only where roots meet without the Jordan chain of an exceptional point.
+        singular: number of starts that ended only at designs where the equations are singular: in a continuum of
+            solutions, or where two solutions coincide. These designs do not count as solutions.
+        crossings: number of starts that ended only where roots meet without the Jordan chain of an exceptional point.
     """
 
     starts: int
@@ -74,7 +72,7 @@ class Every(Tabular):
     """All solutions that were found.
 
     Attributes:
-        solutions: ordered by their parameters if they are proved to be all, else the most frequent first.
+        solutions: ordered by their parameters if the list is proved to be complete, else the most frequent first.
         coverage: how completely the search covered the solutions; None without a search.
         completeness: result of the proof; None without a proof.
         proved: for each solution, whether it is proved to exist.
@@ -96,7 +94,7 @@ class Every(Tabular):
 
     @property
     def complete(self) -> bool:
-        """Whether these are proved to be all solutions."""
+        """Whether it is proved that there are no other solutions."""
         return self.completeness is not None and self.completeness.complete
 
     def records(self) -> Iterable[dict[str, Any]]:
@@ -123,11 +121,11 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Com
 
     Interval branch and prune proves which designs exist and that there is no other. If it takes too long, Newton's
     method starts from designs spread over the box, with every assignment of their roots to factors, and IPOPT from some
-    of them. This ends when each solution was met three times and the estimate expects no more, or after `starts`.
-    Solutions differ in their parameters: exchanged factors do not count.
+    of them. The search ends when each solution was found three times and the estimate expects no others, or after
+    `starts`. Solutions with the same parameters and exchanged factors count as one.
 
     Args:
-        seconds: time limit of the proof; 0 skips it.
+        seconds: time limit of the proof; 0 skips the proof.
         options: ``starts`` at most, `MAX_STARTS` by default, ``seed``, ``linear_solver`` and ``progress``; see
             `tmsopt.Options`.
 
@@ -155,21 +153,23 @@ def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[Com
         errors = {n: float(x.radius) for n, x in intervals.items()} | {"abscissa": 0.0}
         design = clip_to_box(problem, {n: float(x) for n, x in intervals.items()})
         proved_entries.append(_IsolatedDesign(_drop_tiny(design), errors))
-    met_entries, coverage = ([], None) if proof and (proof.complete or proof.stopped) else _search_starts(state)
-    only_proved = [entry for entry in proved_entries if not any(entry.is_same(problem, other) for other in met_entries)]
+    search_entries, coverage = ([], None) if proof and (proof.complete or proof.stopped) else _search_starts(state)
+    proof_only_entries = [
+        entry for entry in proved_entries if not any(entry.is_same(problem, other) for other in search_entries)
+    ]
     if coverage:
-        coverage = replace(coverage, hits=(*coverage.hits, *[0] * len(only_proved)))
-    solutions, existence, bounds = list[Solution](), list[bool](), list[Table[float]]()
-    for entry in (*met_entries, *only_proved):
+        coverage = replace(coverage, hits=(*coverage.hits, *[0] * len(proof_only_entries)))
+    solutions, proved_flags, bounds = list[Solution](), list[bool](), list[Table[float]]()
+    for entry in (*search_entries, *proof_only_entries):
         solution = _make_solution(problem, entry.design)
         matches = [other for other in proved_entries if entry.is_same(problem, other)]
         errors = entry.errors | (matches[0].errors if matches else {})
         largest_root = max((r.size for r in solution.roots), default=0.0)
         sizes = {n: abs(solution.parameters[n]) for n in problem.free} | {"abscissa": largest_root}
         solutions.append(solution)
-        existence.append(bool(matches))
-        bounds.append(Table({n: max(errors.get(n, 0.0), _ROUNDING * x) for n, x in sizes.items()}))
-    return Every(tuple(solutions), coverage, proof, tuple(existence), tuple(bounds))
+        proved_flags.append(bool(matches))
+        bounds.append(Table({n: max(errors.get(n, 0.0), _MIN_ERROR * x) for n, x in sizes.items()}))
+    return Every(tuple(solutions), coverage, proof, tuple(proved_flags), tuple(bounds))
 
 
 @dataclass(eq=False)
@@ -185,7 +185,7 @@ class _IsolatedDesign:
 
 
 def _search_starts(state: SearchState) -> tuple[list[_IsolatedDesign], Coverage]:
-    """Return the solutions that many starts lead to, the most frequent first, and the coverage."""
+    """Search from many starts; return the solutions found, the most frequent first, and the coverage."""
     problem, nlp, starts, progress = state.problem, state.nlp, state.options.starts, state.options.progress
     begin(progress, "searching", "start")
     system = build_square_system(nlp)
@@ -199,19 +199,22 @@ def _search_starts(state: SearchState) -> tuple[list[_IsolatedDesign], Coverage]
         if start_count % _STARTS_PER_IPOPT_RUN == 0 and (local := solve_from(state, Start(start, near=False))).feasible:
             ends.append(find_zero(system, local.run.x) or make_zero(system, local.run.x))
         reached_entries = set[_IsolatedDesign]()
-        met_singular = met_crossing = False
+        found_singular = found_crossing = False
         for end in filter(None, ends):
             design = _take_design(problem, nlp, end.x)
             if design is None:
                 continue
             entry = _IsolatedDesign(design, {})
             match = next((other for other in entries if entry.is_same(problem, other)), None)
-            if end.isolated and match:
+            if end.is_isolated and match:
                 reached_entries.add(match)
                 continue
             checked = recheck(problem, problem.ordered(design))
-            if not end.isolated:
-                met_singular, met_crossing = met_singular or not checked.violations, met_crossing or checked.crossing
+            if not end.is_isolated:
+                found_singular, found_crossing = (
+                    found_singular or not checked.violations,
+                    found_crossing or checked.crossing,
+                )
             elif not checked.violations:
                 # An angle's error is at most its tangent's; the other variables are the factors' coefficients.
                 errors = estimate_error(system, end.x).tolist()
@@ -221,8 +224,8 @@ def _search_starts(state: SearchState) -> tuple[list[_IsolatedDesign], Coverage]
                 reached_entries.add(entry)
         for entry in reached_entries:
             entry.hits += 1
-        singular += met_singular and not reached_entries
-        crossings += met_crossing and not reached_entries
+        singular += found_singular and not reached_entries
+        crossings += found_crossing and not reached_entries
         start_count += 1
         if progress:
             progress(start_count, starts)
@@ -264,10 +267,10 @@ def _drop_tiny(design: Mapping[str, float]) -> dict[str, float]:
 
 
 def _take_design(problem: Posed, nlp: NLP, x: Array) -> dict[str, float] | None:
-    """The free parameters of a solution in the box; None if it is outside."""
+    """The free parameters of a solution; None if the solution is outside the box."""
     parameters, lower, upper = (np.array(values[: len(problem.free)]) for values in (x, nlp.lower, nlp.upper))
-    outside = np.any(np.maximum(lower - parameters, parameters - upper) > _OUTSIDE * (upper - lower))
-    return None if outside else _drop_tiny(design_of(problem, x.tolist()))
+    is_outside = np.any(np.maximum(lower - parameters, parameters - upper) > _MAX_OVERSHOOT * (upper - lower))
+    return None if is_outside else _drop_tiny(design_of(problem, x.tolist()))
 
 
 def _is_covered(start_count: int, hits: list[int]) -> bool:
@@ -284,7 +287,7 @@ def _estimate_total(hits: list[int]) -> float:
 
 
 def estimate_coverage(start_count: int, hits: list[int], singular: int = 0) -> Coverage:
-    """Estimate the coverage of a search; the chance of a new solution is that of Good and Turing (Good 1953)."""
+    """Estimate the coverage of a search; the chance of a new solution follows Good and Turing (Good 1953)."""
     hit_once, hit_twice = (sum(h == k for h in hits) for k in (1, 2))
     # Turing's estimate of the chance is `hit_once` / `start_count`; this is the standard deviation of `hit_once`.
     deviation = math.sqrt(hit_once + 2 * hit_twice)

@@ -10,30 +10,32 @@ from tmsopt.program import NLP
 from tmsopt.records import Array
 
 _MAX_STEPS = 60
-_MAX_STALLS = 3  # steps without progress before Newton gives up
-_MOVE_ULPS, _MOVE_COUNT = 4, 8  # size (in units in the last place) and number of the moves that measure rounding
-_SINGULAR = 1e-9  # ratio of smallest to largest singular value below which the Jacobian counts as singular
+_MAX_STALLED_STEPS = 3  # steps without progress, after which the iteration stops
+_MOVE_ULPS = 4  # size of the moves that measure rounding errors, in units in the last place
+_MOVE_COUNT = 8  # number of these moves
+_SINGULAR = 1e-9  # the Jacobian counts as singular if smallest/largest singular value is below this
 
 
-def find_solutions(nlp: NLP, starts: Iterable[Array], mirrored: int) -> Iterator[Array]:
-    """Yield isolated solutions of an NLP's equations, found by damped Newton steps; there may be others.
+def find_solutions(nlp: NLP, starts: Iterable[Array], mirrored_count: int) -> Iterator[Array]:
+    """Yield isolated solutions of an NLP's equations, found by damped Newton steps; it may miss solutions.
 
-    The steps begin at each start, and at its images with the sign of one of the first `mirrored` variables changed.
-    A solution may be yielded more than once. Without as many equations as variables, nothing is yielded.
+    The steps begin at each start, and at its images with the sign of one of the first `mirrored_count` variables
+    changed. A solution may be yielded more than once. Unless there are as many equations as variables, nothing is
+    yielded.
     """
     system = build_square_system(nlp)
     if system is None:
         return
     for start in starts:
-        images = (np.where(np.arange(len(start)) == k, -start, start) for k in range(mirrored))
+        images = (np.where(np.arange(len(start)) == k, -start, start) for k in range(mirrored_count))
         for image in (start, *images):
             zero = find_zero(system, image)
-            if zero is not None and zero.isolated:
+            if zero is not None and zero.is_isolated:
                 yield zero.x
 
 
 def build_square_system(nlp: NLP) -> ca.Function | None:
-    """Return a function x → (equations of an NLP, their Jacobian); None unless they are as many as the variables."""
+    """Return a function x → (equations of an NLP, their Jacobian); None unless there is one equation per variable."""
     x = ca.SX.sym("x", len(nlp.variables))
     g = nlp.symbolic(x)[1]
     equalities = [k for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
@@ -48,16 +50,16 @@ class Zero:
     """A solution of the equations.
 
     Attributes:
-        isolated: whether the Jacobian is regular there; if not, solutions may form a continuum, or two may meet.
+        is_isolated: whether the Jacobian is regular there; if not, solutions may form a continuum, or two may coincide.
     """
 
     x: Array
-    isolated: bool
+    is_isolated: bool
 
 
 def find_zero(system: ca.Function, x: Array) -> Zero | None:
     """Find a solution of the equations near a point by damped Newton steps; None if they do not converge."""
-    residual, stalls = np.inf, 0
+    residual, stalled_steps = np.inf, 0
     for _ in range(_MAX_STEPS):
         value, jacobian = (np.array(part) for part in system(x))
         if not (np.all(np.isfinite(value)) and np.all(np.isfinite(jacobian))):
@@ -73,8 +75,10 @@ def find_zero(system: ca.Function, x: Array) -> Zero | None:
                 break
             damping /= 2
         else:
-            stalls += 1
-            if stalls >= _MAX_STALLS:  # with many factors, the residual reaches its rounding error before x does
+            stalled_steps += 1
+            if (
+                stalled_steps >= _MAX_STALLED_STEPS
+            ):  # with many factors, the residual reaches its rounding error before x does
                 break
         x = x + damping * step
     return Zero(x, _is_regular(jacobian)) if residual <= 1e-11 * (1 + np.abs(x).max()) else None
@@ -88,8 +92,8 @@ def make_zero(system: ca.Function, x: Array) -> Zero:
 def estimate_error(system: ca.Function, x: Array) -> Array:
     """Estimate the error of each variable of a solution from the residual of the equations and their rounding error.
 
-    The solution is moved by a few units in the last place: what the equations change beyond the linear change is their
-    rounding error. Where a sum swallows a small term, this shows nothing; so one unit of each term is added.
+    The solution is moved by a few units in the last place. The change of the equations minus the linear change is their
+    rounding error. This shows no error where a large term absorbs a small one, so one unit of each term is added.
     """
     value, jacobian = (np.array(part) for part in system(x))
     units = np.random.default_rng(0).choice([-_MOVE_ULPS, _MOVE_ULPS], (_MOVE_COUNT, len(x)))

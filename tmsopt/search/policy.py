@@ -20,13 +20,13 @@ from tmsopt.search.tuning import TUNING, Tuning
 
 @dataclass(frozen=True)
 class Rescue:
-    """A stage that runs after the loop, for problems on which the loop alone ends at a wrong design or at none.
+    """A stage that runs after the loop, for problems on which the loop finds a wrong design or none.
 
     Attributes:
         name: the name to give to `Policy.without`.
         evidence: benchmark suites with the number of problems that get worse without this rescue.
-        applies: tells whether the rescue runs in this state.
-        run: continues the search; it gets the policy too.
+        applies: state → whether the rescue runs.
+        run: state and policy → the state after the rescue.
 
     Example:
         >>> [rescue.name for rescue in tmsopt.POLICY.rescues][-1]
@@ -46,19 +46,19 @@ class Policy:
     """How a part of the box is searched.
 
     Attributes:
-        sample: samples the part before any solve; may return None.
+        sample: samples the part of the box before the first start; may return None.
         starts: yields designs to start from.
-        local: solves from one start, by IPOPT on the program of the state.
+        local: solves the program of the state from one start.
         accept: adds the best end to the state, polished and rechecked.
-        enough: tells whether to stop; called after each start, with the ends on the same program. It is not asked by
-            rescues that have few starts, nor after cases were added: these try all their starts.
+        enough: tells whether to stop. The loop calls it after each start, with the ends on the same program. Rescues
+            with few starts, and searches with added cases, do not call it but try all their starts.
         rescues: stages after the loop, in the order in which they run.
         tuning: the numbers that the stages use.
 
     Example:
         >>> from dataclasses import replace
-        >>> hasty = replace(tmsopt.POLICY, enough=lambda state: len(state.feasible) > 0)
-        >>> tmsopt.solve("problems/ep4.toml", policy=hasty).structure
+        >>> short_policy = replace(tmsopt.POLICY, enough=lambda state: len(state.feasible) > 0)
+        >>> tmsopt.solve("problems/ep4.toml", policy=short_policy).structure
         'EP4'
 
     More: docs/explanation/search.md
@@ -155,8 +155,8 @@ def search_again(
     starts = policy.starts(new_state) if starts is None else starts
     new_state = policy.accept(try_starts(new_state, starts, policy, max_starts))
     ends = (*state.ends, *new_state.ends)
-    better = new_state.best and (state.best is None or is_better(state.problem, new_state.best, state.best))
-    if better:
+    has_improved = new_state.best and (state.best is None or is_better(state.problem, new_state.best, state.best))
+    if has_improved:
         state = replace(new_state, fallback=None)
     return replace(state, ends=ends, accepted=len(ends), interrupted=new_state.interrupted)
 

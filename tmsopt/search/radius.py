@@ -28,9 +28,9 @@ from tmsopt.search.tuning import Tuning
 
 
 def climb(state: SearchState, start: Start) -> LocalEnd:
-    """Climb from one design: add the nearest boundary points and solve again, until the radius is the one claimed.
+    """Climb from one design: add the nearest boundary points and solve again, until a recheck confirms the radius.
 
-    The end is infeasible if that fails.
+    The end is infeasible if no recheck confirms it.
     """
     problem, design, points = state.problem, start.design, list[Case]()
     listed_cases = tuple(case for case in problem.cases if not case.direction)
@@ -58,7 +58,7 @@ def climb(state: SearchState, start: Start) -> LocalEnd:
 
 
 def propose_climbs(state: SearchState) -> Iterator[Start]:
-    """Yield the caller's designs; without any, sampled designs that lie apart, by falling estimates of the radius."""
+    """Yield the caller's designs. If there are none, yield sampled designs that lie apart, the most robust first."""
     problem, tuning = state.part, state.tuning
     yield from (Start(design) for design in state.extra)
     if state.extra:
@@ -91,16 +91,16 @@ RADIUS_POLICY = Policy(lambda _: None, propose_climbs, climb, accept_best, has_e
 
 
 def _has_other_weights(problem: Posed, margins: Robustness) -> bool:
-    """Whether a radius is measured with weights other than the problem's, for example because a parameter is 0."""
+    """Whether a radius has other weights than the problem, for example because a parameter is 0."""
     return any(weight != weight_of(n, margins.parameters[n], problem.weights) for n, weight in margins.weights.items())
 
 
 def _add_boundary_points(problem: Posed, points: list[Case], margins: Robustness, tuning: Tuning) -> list[Case]:
-    """Return the boundary points so far, and those near a design that are new."""
+    """Return the boundary points so far, and new ones near a design."""
     cases = list(points)
     for nearest in (margins.weave, margins.capsize, margins.infinity):
         # The direction has all parameters that the radius varies, also those that are 0 in the design.
-        direction = Table({n: nearest.direction.get(n, 0.0) for n in _list_varied(problem)})
+        direction = Table({n: nearest.direction.get(n, 0.0) for n in _list_varied_parameters(problem)})
         case = Case(direction=direction, edge=nearest.kind)
         is_near = nearest.distance <= tuning.beyond * margins.radius
         if is_near and not any(_is_alike(case, other, tuning.alike_points) for other in points):
@@ -108,36 +108,38 @@ def _add_boundary_points(problem: Posed, points: list[Case], margins: Robustness
     return cases
 
 
-def _is_alike(first: Case, second: Case, share: float) -> bool:
-    u, v = (np.array(list(case.direction.values())) for case in (first, second))
-    return first.edge == second.edge and bool(np.linalg.norm(u - v) <= share * np.linalg.norm(u))
+def _is_alike(point: Case, other: Case, tolerance: float) -> bool:
+    u, v = (np.array(list(case.direction.values())) for case in (point, other))
+    return point.edge == other.edge and bool(np.linalg.norm(u - v) <= tolerance * np.linalg.norm(u))
 
 
-def _move_point(case: Case, k: int, trial: CheckedEnd) -> Case:
-    """Return a boundary point at the place that a trial gives to it."""
+def _move_point(case: Case, index: int, trial: CheckedEnd) -> Case:
+    """Return a boundary point, the case with this index, with the position that it has in a trial."""
     nlp = trial.end.nlp
-    point = {n: float(trial.point.x[nlp.variables.index(f"{n}.{k}")]) for n in case.direction}
-    return replace(case, direction=Table(point))
+    direction = {n: float(trial.point.x[nlp.variables.index(f"{n}.{index}")]) for n in case.direction}
+    return replace(case, direction=Table(direction))
 
 
 def estimate_radii(problem: Posed, columns: Mapping[str, Array], seed: int) -> Array:
-    """Estimate the radii of designs from above: how far the designs stay stable along some rays.
+    """Estimate upper bounds of the radii of designs: how far the designs stay stable along some rays.
 
     Args:
-        columns: free parameters of the designs, an array for each name.
+        columns: free parameter → array with its value in each design.
     """
-    names, steps = _list_varied(problem), np.geomspace(5e-3, 1.5, 20)
+    names, steps = _list_varied_parameters(problem), np.geomspace(5e-3, 1.5, 20)
     random = stream(seed, "rays").standard_normal((24, len(names)))
     rays = np.concatenate([np.eye(len(names)), random / np.linalg.norm(random, axis=1, keepdims=True)])
     radii = []
     for ray in (*rays, *-rays):
         case = Case(direction=dict(zip(names, ray.tolist(), strict=True)))
-        changed = case.applied(problem.ordered(columns), steps[:, None], problem.weights)
-        a = np.broadcast_arrays(*coefficients_of(problem, changed), *changed.values())[: problem.model.degree + 1]
+        changed_parameters = case.applied(problem.ordered(columns), steps[:, None], problem.weights)
+        a = np.broadcast_arrays(*coefficients_of(problem, changed_parameters), *changed_parameters.values())[
+            : problem.model.degree + 1
+        ]
         is_unstable = ~is_stable(np.stack(a, axis=-1), exact=False)
         radii.append(steps[np.where(is_unstable.any(axis=0), is_unstable.argmax(axis=0), len(steps) - 1)])
     return np.asarray(np.min(radii, axis=0) + 1e-3 * np.mean(radii, axis=0))
 
 
-def _list_varied(problem: Posed) -> tuple[str, ...]:
+def _list_varied_parameters(problem: Posed) -> tuple[str, ...]:
     return radius_parameters(problem.parameter_set, problem.weights, problem.fixed)

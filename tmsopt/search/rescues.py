@@ -1,4 +1,4 @@
-"""Rescues: extra stages for problems on which the loop alone ends at a wrong design or at none.
+"""Rescues: extra stages for problems on which the loop finds a wrong design or none.
 
 Each rescue starts from other designs or on another program, and uses the stages of the same policy.
 """
@@ -14,9 +14,9 @@ from tmsopt.models.user_spectrum import full_patterns
 from tmsopt.problem import degrees_of_freedom
 from tmsopt.program import choose_starts, formulate_matching
 from tmsopt.program.formulate import formulate
-from tmsopt.search.acceptance import check_end, claim_matches, is_better, is_sound
+from tmsopt.search.acceptance import check_end, has_matching_claim, is_better, is_sound
 from tmsopt.search.local_search import run_once
-from tmsopt.search.outcome import KEPT, has_runaway_root, write_mass_advice
+from tmsopt.search.outcome import BEST_SAMPLED, has_runaway_root, write_mass_advice
 from tmsopt.search.policy import Policy, Rescue, disable_stopping, search_again, try_starts
 from tmsopt.search.sample import DesignBatch, sample_box, stream
 from tmsopt.search.starts import propose_sample_starts
@@ -27,7 +27,7 @@ from tmsopt.search.stopping import select_distinct_ends
 
 
 def search_real_roots(state: SearchState, policy: Policy) -> SearchState:
-    """Search with all roots real; start from designs of least abscissa whose roots all coincide, if there are any."""
+    """Search with all roots real. Start from designs of least abscissa whose roots all coincide, if there are any."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=1.0)
     if starts := find_multiple_roots(state, policy):
         return search_again(
@@ -37,7 +37,7 @@ def search_real_roots(state: SearchState, policy: Policy) -> SearchState:
 
 
 def find_multiple_roots(state: SearchState, policy: Policy) -> list[Start]:
-    """Find designs of least abscissa whose roots all coincide, in one root or one pair, from their equations."""
+    """Solve the equations of designs whose roots all coincide, in one root or one pair, for the least abscissa."""
     part, tuning, starts = state.part, state.tuning, list[Start]()
     limits = {name: text for name, text in part.constraints.items() if name not in part.asked_of_roots}
     changes = {"minimize": "abscissa", "maximize": None, "constraints": limits, "scenarios": {}, "tolerances": {}}
@@ -64,30 +64,30 @@ def can_have_positive_roots(state: SearchState) -> bool:
     """
     if "damping_ratio" not in state.nlp.variables:
         return False
-    if state.best is None or "damping_ratio" in state.nlp.contacts:  # then a smaller damping ratio may be better
+    if state.best is None or "damping_ratio" in state.nlp.contacts:  # a smaller damping ratio may be better
         return True
     goal = state.problem.objective
     return not (goal and "damping_ratio" in goal.names) and state.best.checked.structure.abscissa > 0
 
 
 def search_positive_roots(state: SearchState, policy: Policy) -> SearchState:
-    """Search with a damping ratio of −1, without a sector."""
+    """Search with the damping ratio −1, which keeps the roots in no sector."""
     nlp = formulate(state.part, state.problem.cases, damping_ratio=-1.0)
-    few_starts = (state.best and state.nlp.contacts) or (state.problem.sense, state.problem.goal) == (
+    has_few_starts = (state.best and state.nlp.contacts) or (state.problem.sense, state.problem.goal) == (
         "maximize",
         "damping_ratio",
     )
-    return search_again(state, policy, nlp=nlp, max_starts=state.tuning.fewer if few_starts else 0)
+    return search_again(state, policy, nlp=nlp, max_starts=state.tuning.fewer if has_few_starts else 0)
 
 
 def has_only_crossings(state: SearchState) -> bool:
     """Whether starts for a pattern with freedom ended only where roots meet without a Jordan chain."""
-    crossing, best = any(end.crossing for end in state.ends), state.best
-    return crossing and (not best or bool(best.checked.violations)) and degrees_of_freedom(state.problem).count > 0
+    has_crossing, best = any(end.crossing for end in state.ends), state.best
+    return has_crossing and (not best or bool(best.checked.violations)) and degrees_of_freedom(state.problem).count > 0
 
 
 def search_other_chains(state: SearchState, policy: Policy) -> SearchState:
-    """Search for exceptional points from other starts, as the one nearest to the first start is only a crossing."""
+    """Search for exceptional points from other starts, because the points found first are only crossings."""
     part = state.part
     for design in choose_starts(part, state.options.seed, state.tuning.chains):
         nlp = formulate_matching(part.derive(minimize=None, maximize=None, start=design))
@@ -134,7 +134,7 @@ def restart_from_rivals(state: SearchState, policy: Policy) -> SearchState:
 
 
 def has_doubtful_claim(state: SearchState) -> bool:
-    """Whether an end claims a better objective than the best design, or a root near 0 lets the damping ratio jump."""
+    """Whether an end claims a better objective than the best design, or a root near 0 makes the damping ratio jump."""
     goal, best, threshold = state.problem.objective, state.best, compute_threshold(state)
     if state.sample is None:
         return False
@@ -146,18 +146,18 @@ def has_doubtful_claim(state: SearchState) -> bool:
 
 
 def move_aside(state: SearchState, policy: Policy) -> SearchState:
-    """Replace the best end by a design close to an end, if the design has the objective that this end claims."""
+    """Replace the best end by a design close to an end, if that design has the objective claimed for this end."""
     problem, tolerance = state.problem, state.tuning.lost
     for end in select_distinct_ends(state.ends)[: state.tuning.asides]:
         checked_end = check_end(state, end)
         for design in (checked_end.parameters, *_propose_near_designs(state, checked_end.parameters, end.objective)):
             checked = state.recheck(design)
             neighbour = replace(checked_end, parameters=problem.ordered(design), checked=checked)
-            if checked.violations or not claim_matches(problem, neighbour):
+            if checked.violations or not has_matching_claim(problem, neighbour):
                 continue
             exact_value = certified_numbers(problem, neighbour.parameters, checked, state.nlp.cases).value
-            confirmed = math.isclose(exact_value, problem.sign * end.objective, rel_tol=tolerance, abs_tol=tolerance)
-            if confirmed and (state.best is None or not is_better(problem, state.best, neighbour)):
+            is_confirmed = math.isclose(exact_value, problem.sign * end.objective, rel_tol=tolerance, abs_tol=tolerance)
+            if is_confirmed and (state.best is None or not is_better(problem, state.best, neighbour)):
                 return replace(state, best=neighbour)
     return state
 
@@ -165,7 +165,7 @@ def move_aside(state: SearchState, policy: Policy) -> SearchState:
 def _propose_near_designs(
     state: SearchState, design: Mapping[str, float], objective: float
 ) -> Iterator[dict[str, float]]:
-    """Yield designs near a design, in the direction of others, that meet the limits and have nearly this objective."""
+    """Move a design slightly towards others; yield designs that meet the limits and have nearly this objective."""
     assert state.sample is not None
     box, tuning = state.sample.box, state.tuning
     point = box.space.points(design)
@@ -174,7 +174,7 @@ def _propose_near_designs(
     points = point + np.array(tuning.hairs)[:, None, None] * (targets - point)
     batch = box.judge_points(points.reshape(-1, len(point)))
     is_close = (batch.violation == 0) & (np.abs(batch.objective - objective) <= tuning.edge * (1 + abs(objective)))
-    # The rows go from far to near: a far design may be worse, and rounding decides between near ones.
+    # The rows go from large moves to small ones: a large move may worsen the design, a tiny one is lost in rounding.
     rows = np.flatnonzero(is_close)
     return box.designs(batch.take(rows[:: max(len(rows) // tuning.kept, 1)]))
 
@@ -189,7 +189,7 @@ def keep_rival(state: SearchState, policy: Policy) -> SearchState:
     for design in box.designs(fine_batch.take_first(state.tuning.kept)):
         checked = state.recheck(design)
         if not checked.violations and state.problem.sign * checked.objective < compute_threshold(state):
-            return replace(state, fallback=Fallback(design, KEPT))
+            return replace(state, fallback=Fallback(design, BEST_SAMPLED))
     return state
 
 
@@ -203,11 +203,11 @@ def can_approach_infinity(state: SearchState) -> bool:
         return False
     if find_rivals(state):
         return True
-    if not sample.singular:
+    if not sample.is_nearly_singular:
         return False
-    starts_failed = bool(np.any(sample.refined.violation == 0)) and not all(end.feasible for end in state.ends)
+    has_failed_start = bool(np.any(sample.refined.violation == 0)) and not all(end.feasible for end in state.ends)
     return (
-        starts_failed
+        has_failed_start
         or best is None
         or has_runaway_root(best.checked.structure.roots, state.tuning.far_root)
         or bool(find_singular_rivals(state))
@@ -215,9 +215,9 @@ def can_approach_infinity(state: SearchState) -> bool:
 
 
 def find_singular_rivals(state: SearchState) -> DesignBatch:
-    """Find designs with a singular mass matrix that are better than the best end if roots at infinity are ignored."""
+    """Find designs with a singular mass matrix that, without their roots at infinity, are better than the best end."""
     assert state.sample is not None
-    if not state.sample.singular:
+    if not state.sample.is_nearly_singular:
         return state.sample.refined.take_first(0)
     a0 = state.part.model.coefficient_names()[0]
     limits = {**state.part.constraints, "a singular mass matrix": f"{a0} == 0"}
@@ -228,8 +228,8 @@ def find_singular_rivals(state: SearchState) -> DesignBatch:
 def search_singular(state: SearchState, policy: Policy) -> SearchState:
     """Search on both sides of a0 = 0, which the program may reach here.
 
-    The search finds an optimum that no end reached, or an infimum at a0 = 0, where the fallback says that no design is
-    the best.
+    The search finds an optimum that no end reached, or an infimum at a0 = 0. At an infimum no design is the best; the
+    words of the fallback say so.
     """
     assert state.sample is not None
     tuning, box, best = state.tuning, state.sample.box, state.best
@@ -239,8 +239,8 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
     starts = [Start(design) for design in box.designs(rivals.take(chosen_rows))]
     starts += [Start(best.parameters)] if best else []
     starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.take_first(tuning.open))]
-    at_zero = best is not None and abs(compute_relative_a0(state, best.parameters)) < tuning.singular
-    threshold = compute_threshold(state, -tuning.lost if at_zero else tuning.finer)
+    is_at_zero = best is not None and abs(compute_relative_a0(state, best.parameters)) < tuning.singular
+    threshold = compute_threshold(state, -tuning.lost if is_at_zero else tuning.finer)
     for sign in (1, -1):
         side_starts = [s for s in starts if sign * compute_relative_a0(state, s.design) > -tuning.singular]
         nlp = formulate(state.part, state.nlp.cases, lead=sign)
@@ -249,15 +249,15 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
         if best_end is None or not best_end.objective < threshold:
             continue
         is_a0_row = np.array(nlp.rows) == "a0"
-        singular = bool(nlp.evaluate(best_end.run.x)[1][is_a0_row].min() < tuning.singular)
-        if singular:
+        is_singular = bool(nlp.evaluate(best_end.run.x)[1][is_a0_row].min() < tuning.singular)
+        if is_singular:
             lower = np.where(is_a0_row, tuning.inside, nlp.row_lower)
             side_state = state.with_program(replace(nlp, row_lower=tuple(lower.tolist())))
             side_state = try_starts(side_state, [Start(state.design_at(best_end))], disable_stopping(policy))
         side_state = policy.accept(side_state)
         if side_state.best is None or side_state.best.checked.violations or has_merged_roots(side_state.best):
-            is_near_singular = best and singular and has_runaway_root(best.checked.structure.roots, tuning.far_root)
-            if best and is_near_singular and best_end.objective < compute_threshold(state):
+            is_near_infinity = best and is_singular and has_runaway_root(best.checked.structure.roots, tuning.far_root)
+            if best and is_near_infinity and best_end.objective < compute_threshold(state):
                 advice = write_mass_advice(state.problem)
                 words = f"a better design may be close to a singular mass matrix (a0 = 0); {advice}"
                 state = replace(state, fallback=Fallback(best.parameters, words))
@@ -266,9 +266,9 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
             continue
         ends, threshold = (*state.ends, *side_state.ends), compute_threshold(side_state, tuning.finer)
         state = replace(side_state, ends=ends, accepted=len(ends), fallback=None)
-        if singular:
+        if is_singular:
             goal = f"towards a singular mass matrix (a0 = 0), to {state.problem.sign * best_end.objective:.9g}"
-            words = f"no best design: it improves {goal}; {write_mass_advice(state.problem)}"
+            words = f"no best design: the objective improves {goal}; {write_mass_advice(state.problem)}"
             state = replace(state, fallback=Fallback(side_state.best.parameters, words, without_best=True))
     return state
 
@@ -280,7 +280,7 @@ def compute_relative_a0(state: SearchState, design: Mapping[str, float]) -> floa
 
 
 def has_merged_roots(trial: CheckedEnd) -> bool:
-    """Whether distant roots count as one root, because rounding errors near a0 = 0 dominate the coefficients."""
+    """Whether distant roots count as one, because rounding errors near a0 = 0 dominate the coefficients."""
     ideal, stored = trial.checked.structure.abscissa, trial.checked.realised
     return abs(ideal - stored) > trial.tuning.merged * abs(ideal)
 
@@ -295,4 +295,4 @@ RESCUES = (
     Rescue("infinity", "hard 9", can_approach_infinity, search_singular),
     Rescue("kept design", "", lambda s: bool(find_rivals(s)) and s.fallback is None, keep_rival),
 )
-"""In the order in which they run."""
+"""All rescues, in the order in which they run."""

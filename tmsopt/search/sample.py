@@ -1,7 +1,7 @@
-"""A quasi-random sample of the box, the source of starts and of designs better than the ends.
+"""A quasi-random sample of the box: it gives designs to start from, and designs that are better than the ends.
 
-To *judge* designs is to compute their objective and violations, all at once in arrays. To *refine* them is to improve
-each by random steps that become shorter.
+To *judge* designs is to compute their objectives and violations, in arrays for all designs together. To *refine* a
+design is to improve it by random steps that become shorter. A *leader* is a design to start from.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,11 +23,12 @@ from tmsopt.records import Array
 from tmsopt.search.tuning import TUNING, Tuning
 
 Rows = NDArray[np.int_]
+"""Indices of designs in a batch."""
 
 
 @dataclass(frozen=True)
 class DesignBatch:
-    """Judged designs, as points of the unit cube; sorting keeps the order of equal ones.
+    """Judged designs, as points of the unit cube; equally good designs keep their order when sorted.
 
     Attributes:
         u: points, shape (designs, free parameters).
@@ -65,7 +66,7 @@ class DesignBatch:
         return self.take(np.arange(len(self))[:count])
 
     def select_apart(self, count: int, distance: float) -> "DesignBatch":
-        """Return at most `count` designs that are this far apart; an earlier design wins over a later one near it."""
+        """Return at most `count` designs that are this far apart; drop a design that is near an earlier one."""
         rows: list[int] = []
         remaining_rows = np.arange(len(self))
         while remaining_rows.size and len(rows) < count:
@@ -76,7 +77,7 @@ class DesignBatch:
         return self.take(np.array(rows, dtype=int))
 
     def select_scattered(self, count: int, cell: float) -> "DesignBatch":
-        """Return the first design in each cell of a grid, at most `count`; this is faster than `select_apart`."""
+        """Return the first design in each cell of a grid, but at most `count`; this is faster than `select_apart`."""
         cells = np.floor(self.u / cell) @ np.random.default_rng(0).random(self.u.shape[1])
         return self.take(np.sort(np.unique(cells, return_index=True)[1])[:count])
 
@@ -85,7 +86,7 @@ class DesignBatch:
         batch = self.take(np.flatnonzero((self.violation == 0) & (self.objective < threshold)))
         return batch.take(batch.order)
 
-    def misses_by(self, amount: float) -> bool:
+    def all_violate_by(self, amount: float) -> bool:
         """Whether all designs violate limits by more than this amount."""
         return bool(np.all(self.violation > amount))
 
@@ -97,14 +98,14 @@ class Box:
     Attributes:
         scales: unit of each limit's excess.
         draws: the drawn designs.
-        judged: values of the drawn designs, limit by limit.
+        draw_scores: objectives and excesses of the drawn designs, limit by limit.
     """
 
     space: UnitBox
     seed: int
     scales: Array
     draws: DesignBatch
-    judged: DesignScores
+    draw_scores: DesignScores
     tuning: Tuning = TUNING
 
     @property
@@ -125,25 +126,32 @@ class Box:
         return (self.design(batch, row) for row in range(len(batch)))
 
     @property
-    def narrow(self) -> bool:
+    def is_narrow(self) -> bool:
         """Whether few designs meet all limits."""
         return bool(np.mean(self.draws.violation == 0) < self.tuning.narrow)
 
-    def refine(self, start: DesignBatch, reaches: Sequence[float | Array] = (), local: int = 0) -> DesignBatch:
-        """Improve each design by random steps that become shorter; first by the violation, then by the objective.
+    def refine(
+        self, start: DesignBatch, step_sizes: Sequence[float | Array] = (), neighbour_count: int = 0
+    ) -> DesignBatch:
+        """Improve each design by random steps that become shorter; first its violation, then its objective.
 
         Args:
-            reaches: step sizes round after round, as shares of the box, or for each design and direction, shape
-                (designs, 1, size).
-            local: number of designs to judge around each design, in each round.
+            step_sizes: one for each round, relative to the box: a number, or an array of shape (designs, 1, size) with
+                a number for each design and direction.
+            neighbour_count: number of designs to judge around each design, in each round.
         """
-        batch, rng, local, size = start, stream(self.seed, "refine"), local or self.tuning.local, self.space.size
+        batch, rng, count, size = (
+            start,
+            stream(self.seed, "refine"),
+            neighbour_count or self.tuning.local,
+            self.space.size,
+        )
         rows = np.arange(len(start))
-        for reach in (reaches or self.tuning.reaches) if rows.size else ():
-            steps = rng.standard_normal((rows.size, local, size))
-            steps[:, ::2] *= rng.random(steps[:, ::2].shape) < 0.5  # change some directions only
-            neighbours = self.judge_points(np.clip(batch.u[:, None] + reach * steps, 0.0, 1.0).reshape(-1, size))
-            candidates, origins = batch.join(neighbours), np.concatenate([rows, np.repeat(rows, local)])
+        for step_size in (step_sizes or self.tuning.reaches) if rows.size else ():
+            steps = rng.standard_normal((rows.size, count, size))
+            steps[:, ::2] *= rng.random(steps[:, ::2].shape) < 0.5  # every second step changes some parameters only
+            neighbours = self.judge_points(np.clip(batch.u[:, None] + step_size * steps, 0.0, 1.0).reshape(-1, size))
+            candidates, origins = batch.join(neighbours), np.concatenate([rows, np.repeat(rows, count)])
             order = np.lexsort((candidates.objective, candidates.violation, origins))
             batch = candidates.take(order[np.searchsorted(origins[order], rows)])
         return batch
@@ -153,42 +161,44 @@ class Box:
         batch, is_moving = start, np.isfinite(start.violation)
         for step in range(self.tuning.newton_steps):
             rows = np.flatnonzero((batch.violation > 0) & is_moving)
-            if not rows.size or (step == self.tuning.hopeless_steps and batch.misses_by(self.unreachable)):
+            if not rows.size or (
+                step == self.tuning.hopeless_steps and batch.all_violate_by(self.unreachable_violation)
+            ):
                 break
-            u, shares = batch.u[rows], np.array(self.tuning.shares)
-            trial_points = np.clip(u[:, None] + self._newton_steps(u)[:, None] * shares[:, None], 0.0, 1.0)
+            u, fractions = batch.u[rows], np.array(self.tuning.shares)
+            trial_points = np.clip(u[:, None] + self._newton_steps(u)[:, None] * fractions[:, None], 0.0, 1.0)
             trials = self.judge_points(trial_points.reshape(-1, self.space.size))
-            best = np.argmin(trials.violation.reshape(len(rows), -1), axis=1) + np.arange(len(rows)) * len(shares)
+            best = np.argmin(trials.violation.reshape(len(rows), -1), axis=1) + np.arange(len(rows)) * len(fractions)
             is_better = is_moving[rows] = trials.violation[best] < batch.violation[rows]
-            places = np.arange(len(batch))
-            places[rows[is_better]] = len(batch) + best[is_better]
-            batch = batch.join(trials).take(places)
+            kept_rows = np.arange(len(batch))
+            kept_rows[rows[is_better]] = len(batch) + best[is_better]
+            batch = batch.join(trials).take(kept_rows)
         return batch
 
     def explore(self, design: Mapping[str, float]) -> DesignBatch:
-        """Find the best designs around a design: at all distances, and with one parameter at an end of its range."""
+        """Find the best designs around a design: at many distances, and with one parameter at an end of its range."""
         tuning, size = self.tuning, self.space.size
         u, rng = self.space.points(design), stream(self.seed, "around")
-        reach = np.repeat(np.geomspace(0.5, 1e-5, tuning.shells), tuning.shell)[:, None]
-        steps = rng.standard_normal((len(reach), size))
+        distances = np.repeat(np.geomspace(0.5, 1e-5, tuning.shells), tuning.shell)[:, None]
+        steps = rng.standard_normal((len(distances), size))
         steps[::2] *= rng.random(steps[::2].shape) < 0.5
         ends = np.repeat(u[None], 2 * size, axis=0)
         ends[np.arange(len(ends)), np.arange(len(ends)) // 2] = np.tile([0.0, 1.0], size)
-        batch = self.judge_points(np.clip(np.concatenate([u[None], u + reach * steps, ends]), 0.0, 1.0))
+        batch = self.judge_points(np.clip(np.concatenate([u[None], u + distances * steps, ends]), 0.0, 1.0))
         return batch.take_best(tuning.ranked).select_apart(tuning.leaders, tuning.beside)
 
     def ignore_limit(self, limit: str) -> DesignBatch:
         """Find designs far apart that violate the other limits least; their violations do not include this limit."""
         is_ignored = [name == limit for name in self.problem.conditions]
         box = replace(self, scales=np.where(is_ignored, 1e300, self.scales))
-        draws = _make_batch(self.draws.u, self.judged, box.scales, self.tuning)
+        draws = _make_batch(self.draws.u, self.draw_scores, box.scales, self.tuning)
         leaders = draws.take_best(self.tuning.ranked).select_apart(self.tuning.leaders, self.tuning.apart)
         batch = box.refine(box.approach_limits(leaders))
         return batch.take(batch.order)
 
     @property
-    def unreachable(self) -> float:
-        """Violation that no n-fold root explains: a sample misses such a root by the n-th root of its last step."""
+    def unreachable_violation(self) -> float:
+        """Largest violation near an n-fold root: a sample misses the root by the n-th root of its last step size."""
         return self.tuning.unreachable * float(self.tuning.reaches[-1] ** (1 / max(self.problem.model.degree, 4)))
 
     def _newton_steps(self, u: Array) -> Array:
@@ -196,12 +206,12 @@ class Box:
         size = self.space.size
         steps = np.where(u < 0.5, self.tuning.difference, -self.tuning.difference)
         points = u[:, None] + np.concatenate([np.zeros((1, size)), np.eye(size)])[None] * steps[:, None]
-        judged = score_designs(self.problem, self.space.designs(points.reshape(-1, size)))
-        excess = judged.beyond.reshape(len(judged.beyond), len(u), size + 1) / self.scales[:, None, None]
-        violated = judged.equal[:, None] | (excess[:, :, 0] > 0)
-        target = np.where(violated, excess[:, :, 0], 0.0)
-        with np.errstate(over="ignore", invalid="ignore"):  # limits without a value
-            slopes = np.where(violated[:, :, None], (excess[:, :, 1:] - excess[:, :, :1]) / steps, 0.0)
+        scores = score_designs(self.problem, self.space.designs(points.reshape(-1, size)))
+        excess = scores.beyond.reshape(len(scores.beyond), len(u), size + 1) / self.scales[:, None, None]
+        is_violated = scores.equal[:, None] | (excess[:, :, 0] > 0)
+        target = np.where(is_violated, excess[:, :, 0], 0.0)
+        with np.errstate(over="ignore", invalid="ignore"):  # some limits have no value
+            slopes = np.where(is_violated[:, :, None], (excess[:, :, 1:] - excess[:, :, :1]) / steps, 0.0)
         slopes, target = np.nan_to_num(slopes, posinf=0.0, neginf=0.0), np.nan_to_num(target)
         inverse = np.linalg.pinv(np.moveaxis(slopes, 0, 1), rcond=1e-10)
         return np.asarray(-np.einsum("rnm,mr->rn", inverse, target))
@@ -209,20 +219,21 @@ class Box:
 
 @dataclass(frozen=True)
 class Sample:
-    """Designs in the box that were judged before the first run of the solver.
+    """Designs in the box that are judged before the first run of the solver.
 
     Attributes:
-        refined: designs far apart that violate limits least, or have the best objective if feasible, after refinement.
-        boldest: designs far apart with the best objective, whatever they violate.
+        refined: refined designs that lie far apart: feasible ones with the best objective, or those that violate limits
+            least.
+        boldest: designs that lie far apart and have the best objective, even if they violate limits.
         spread: interquartile range of the objective of the drawn designs.
-        singular: whether a0 comes near 0 among the designs that violate limits least: the mass matrix may be singular.
+        is_nearly_singular: whether a0 comes near 0 in the designs that violate limits least; M may be singular.
     """
 
     box: Box
     refined: DesignBatch
     boldest: DesignBatch
     spread: float
-    singular: bool
+    is_nearly_singular: bool
 
     @cached_property
     def leaders(self) -> DesignBatch:
@@ -235,37 +246,37 @@ class Sample:
         return float(self.refined.violation[0]), float(self.refined.objective[0])
 
     @property
-    def far_off(self) -> bool:
-        """Whether limits seem to exclude each other: no refined design comes near to meeting them."""
-        return self.refined.misses_by(self.box.tuning.far_off)
+    def is_far_off(self) -> bool:
+        """Whether no refined design comes near to meeting the limits, so that they seem to exclude each other."""
+        return self.refined.all_violate_by(self.box.tuning.far_off)
 
     @property
     def out_of_reach(self) -> bool:
-        """Whether all refined designs violate limits by more than a multiple root explains; see `Box.unreachable`."""
-        return self.refined.misses_by(self.box.unreachable)
+        """Whether all refined designs violate limits by more than `Box.unreachable_violation`."""
+        return self.refined.all_violate_by(self.box.unreachable_violation)
 
 
 def stream(seed: int, stage: str) -> np.random.Generator:
-    """Return a generator of random numbers for one stage; other stages have independent ones."""
+    """Return the generator of random numbers of one stage; each stage has an independent one."""
     return np.random.default_rng([seed, crc32(stage.encode())])
 
 
 def draw_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Box:
-    """Draw and judge the corners of the box and a quasi-random sequence, some points of which are moved to faces."""
+    """Draw and judge the corners of the box and quasi-random points; some of these are moved to faces of the box."""
     space = UnitBox(problem)
     u = _draw_points(space, seed, tuning)
-    judged = score_designs(problem, space.designs(u))
-    sizes = [np.abs(excess[np.isfinite(excess)]) for excess in judged.beyond]
+    scores = score_designs(problem, space.designs(u))
+    sizes = [np.abs(excess[np.isfinite(excess)]) for excess in scores.beyond]
     medians = np.array([float(np.median(x)) if x.size else 0.0 for x in sizes])
     scales = np.where(medians > 0, medians, 1.0)
-    return Box(space, seed, scales, _make_batch(u, judged, scales, tuning), judged, tuning)
+    return Box(space, seed, scales, _make_batch(u, scores, scales, tuning), scores, tuning)
 
 
 def sample_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Sample:
     """Draw a sample and refine its best designs."""
     box = draw_box(problem, seed, tuning)
     draws, ranked = box.draws, box.draws.take_best(tuning.ranked)
-    if box.narrow:
+    if box.is_narrow:
         approached = box.approach_limits(ranked.select_scattered(tuning.sought, tuning.cell))
         refined = box.refine(approached.take(approached.order).select_apart(2 * tuning.leaders, tuning.apart))
     else:
@@ -275,16 +286,18 @@ def sample_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Sample:
     spread = float(np.subtract(*np.percentile(objectives, [75, 25]))) if objectives.size else 0.0
     leading = coefficients_of(problem, problem.ordered(box.space.designs(ranked.u)))[0]
     a0 = np.nan_to_num(np.broadcast_to(leading, len(ranked)))
-    singular = bool(a0.min() <= 0 <= a0.max() or np.abs(a0).min() < tuning.vanishing * np.median(np.abs(a0)))
-    return Sample(box, refined.take(refined.order), boldest.select_apart(tuning.bold, tuning.apart), spread, singular)
+    is_singular = bool(a0.min() <= 0 <= a0.max() or np.abs(a0).min() < tuning.vanishing * np.median(np.abs(a0)))
+    return Sample(
+        box, refined.take(refined.order), boldest.select_apart(tuning.bold, tuning.apart), spread, is_singular
+    )
 
 
 def _draw_points(space: UnitBox, seed: int, tuning: Tuning) -> Array:
-    """Draw the points of a sample: a third near 0 in all parameters, a third near 0 in some; a few lie on faces."""
+    """Draw the points of a sample: a third have all parameters near 0, a third have some near 0; a few lie on faces."""
     problem, size = space.problem, space.size
-    cost = max(1, len(problem.cases)) * (1 if problem.model.degree <= 4 else tuning.slower)
+    relative_cost = max(1, len(problem.cases)) * (1 if problem.model.degree <= 4 else tuning.slower)
     max_count = min(tuning.first * 4 ** min(size, 4), tuning.most)
-    count = max(max_count // cost, tuning.least)
+    count = max(max_count // relative_cost, tuning.least)
     offset = np.random.default_rng(seed).random(size)
     u = (offset + np.arange(1, count + 1)[:, None] * golden_steps(size)) % 1.0
     index = np.arange(count)[:, None]
@@ -295,9 +308,9 @@ def _draw_points(space: UnitBox, seed: int, tuning: Tuning) -> Array:
     return np.concatenate([np.full((1, size), 0.5), corners, u])
 
 
-def _make_batch(u: Array, judged: DesignScores, scales: Array, tuning: Tuning) -> DesignBatch:
-    objective = np.zeros(len(u)) if judged.worth is None else judged.worth
-    excess = judged.excess / scales[:, None]
+def _make_batch(u: Array, scores: DesignScores, scales: Array, tuning: Tuning) -> DesignBatch:
+    objective = np.zeros(len(u)) if scores.worth is None else scores.worth
+    excess = scores.excess / scales[:, None]
     violation = np.where(excess <= tuning.met, 0.0, excess).sum(axis=0)
     return DesignBatch(u, np.where(np.isfinite(objective), objective, np.inf), violation)
 
@@ -305,26 +318,29 @@ def _make_batch(u: Array, judged: DesignScores, scales: Array, tuning: Tuning) -
 def _add_basins(box: Box, leaders: DesignBatch) -> DesignBatch:
     """Refine the leaders and the best design of each basin that the sample shows; return the best few of both."""
     tuning = box.tuning
-    rows, reach = find_basins(box.draws, *box.space.even_near_zero(box.draws.u), tuning)
+    rows, cell_sizes = find_basins(box.draws, *box.space.even_near_zero(box.draws.u), tuning)
     count, start = len(leaders), leaders.join(box.draws.take(rows[: tuning.basins]))
-    steps: list[float | Array] = [
-        np.concatenate([np.full((count, 1, box.space.size), far), share * reach[: tuning.basins, None]])
-        for far, share in zip((*tuning.reaches, tuning.reaches[-1]), tuning.basin_reaches, strict=True)
+    step_sizes: list[float | Array] = [
+        np.concatenate([np.full((count, 1, box.space.size), of_box), of_cell * cell_sizes[: tuning.basins, None]])
+        for of_box, of_cell in zip((*tuning.reaches, tuning.reaches[-1]), tuning.basin_reaches, strict=True)
     ]
-    batch = box.refine(start, steps, tuning.basin_local)
+    batch = box.refine(start, step_sizes, tuning.basin_local)
     basins = batch.take(np.arange(count, len(batch)))
     return batch.take(np.arange(count)).join(basins.take_best(tuning.deepest))
 
 
 def find_basins(batch: DesignBatch, coordinates: Array, slopes: Array, tuning: Tuning = TUNING) -> tuple[Rows, Array]:
-    """Find rows that are best in their cell of a grid and in all neighbouring cells; the best comes first.
+    """Find the basins of a sample: its best designs among their neighbours.
 
-    A path that goes from each design to a better neighbour ends at one of these, as in Törn's topographs. The second
-    result is the size of the cell around each of these rows.
+    A path that goes from each design to a better neighbour ends at one of these, as in Törn's topographs.
 
     Args:
-        coordinates: of the designs, from 0 to 1, in which the designs are spread evenly.
+        coordinates: coordinates of the designs, from 0 to 1, in which the designs are spread evenly.
         slopes: derivatives of these coordinates by those of the cube; a cell in the cube is smaller by this factor.
+
+    Returns:
+        The rows of designs that are best in their cell of a grid and in all neighbouring cells, the best first; and the
+        size of the cell around each of these designs.
     """
     size = batch.u.shape[1]
     cells_per_design = min(tuning.cells, 3**size / (4 * (size + 2)))
@@ -337,8 +353,8 @@ def find_basins(batch: DesignBatch, coordinates: Array, slopes: Array, tuning: T
     np.minimum.at(best_rank, cell, rank)
     grid = best_rank.reshape((count,) * size)
     for axis in range(size):
-        ends = np.concatenate([grid.take([0], axis), grid, grid.take([-1], axis)], axis)
-        grid = sliding_window_view(ends, 3, axis).min(axis=-1)
+        padded_grid = np.concatenate([grid.take([0], axis), grid, grid.take([-1], axis)], axis)
+        grid = sliding_window_view(padded_grid, 3, axis).min(axis=-1)
     rows = np.flatnonzero(grid.ravel()[cell] == rank)
     rows = rows[np.argsort(rank[rows])]
     return rows, 1 / (count * slopes[rows])

@@ -1,4 +1,4 @@
-"""Search one part of the box: from the initial state to a design with a status, checked also in its worst cases."""
+"""Search one part of the box: from the initial state to a design with a status, also checked in its worst cases."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -29,11 +29,11 @@ from tmsopt.search.state import CheckedEnd, SearchState, Start, is_close, same_o
 from tmsopt.search.stopping import count_starts, is_enough, select_distinct_ends
 
 POLICY = Policy(sample_part, propose_starts, solve_from, accept_best, is_enough, RESCUES)
-"""The default search."""
+"""The default policy."""
 
 
 def search_part(state: SearchState, policy: Policy = POLICY) -> tuple[SearchState, Outcome | None]:
-    """Run a search; return its final state and its best design, or None if it found no feasible design."""
+    """Run a search. Return its final state and its best design, with None for the design if none is feasible."""
     goal = state.problem.objective.names if state.problem.objective else ()
     if RADIUS in goal and state.problem.pattern is None:
         state = search(state, replace(RADIUS_POLICY, tuning=policy.tuning))
@@ -43,7 +43,7 @@ def search_part(state: SearchState, policy: Policy = POLICY) -> tuple[SearchStat
 
 
 def search_nested(state: SearchState) -> Outcome | None:
-    """Return the best design of a search that runs inside another search.
+    """Return the best design of a search that runs inside another search; None if none is feasible.
 
     Raises:
         KeyboardInterrupt: if the user stops it, so that the outer search stops too.
@@ -64,39 +64,41 @@ def _assess_search(state: SearchState, policy: Policy) -> Outcome | None:
             status="not_converged",
             starts=starts,
             formulation=state.nlp.formulation,
-            without_best=fallback.without_best,
+            has_no_best_design=fallback.without_best,
         )
         return demote_if_unbounded(state, outcome)
-    result = cover_cases(state, policy, starts) if problem.cases else assess_best(state, starts)
+    result = add_worst_cases(state, policy, starts) if problem.cases else assess_best(state, starts)
     return demote_if_unbounded(state, demote_if_beaten(state, result)) if result else None
 
 
-def cover_cases(state: SearchState, policy: Policy, starts: Starts) -> Outcome | None:
-    """Add cases until no case between them is worse, and return the best design, with its status."""
+def add_worst_cases(state: SearchState, policy: Policy, starts: Starts) -> Outcome | None:
+    """Add the worst cases between the listed ones and solve again, until none is worse; return the best design."""
     problem, tuning = state.problem, state.tuning
-    exhaustive = disable_stopping(policy)
+    exhaustive_policy = disable_stopping(policy)
     if state.best and problem.asks_radius and not any(case.edge for case in state.nlp.cases):
         designs = (state.best.parameters, *_list_leaders(state))
-        climbed = search(replace(state.with_program(state.nlp), extra=designs), replace(RADIUS_POLICY, tuning=tuning))
-        state = climbed if climbed.best else state
-    best, worst = state.best, dict[str, Worst]()
+        climb_state = search(
+            replace(state.with_program(state.nlp), extra=designs), replace(RADIUS_POLICY, tuning=tuning)
+        )
+        state = climb_state if climb_state.best else state
+    best, worst_cases = state.best, dict[str, Worst]()
     for _ in range(tuning.far_rounds if problem.asks_radius else tuning.rounds):
         trial = state.best
         if trial is None or best is None:
             return None
         if sum(trial.checked.violations.values()) > math.sqrt(FEASIBLE) and not problem.asks_radius:
-            break  # the current cases are not met
-        worst = find_worst_cases(problem, trial.parameters)
-        new_cases = _find_uncovered_cases(problem, trial, worst)
+            break  # the design violates limits in the present cases
+        worst_cases = find_worst_cases(problem, trial.parameters)
+        new_cases = _find_worse_cases(problem, trial, worst_cases)
         if not new_cases:
             break
-        best, worst = trial if is_better(problem, trial, best) else best, {}
-        current = [best.parameters] if best is trial else [best.parameters, trial.parameters]
-        leaders = _select_apart(problem, [*current, *_list_leaders(state)], tuning.alike_designs)
+        best, worst_cases = trial if is_better(problem, trial, best) else best, {}
+        best_designs = [best.parameters] if best is trial else [best.parameters, trial.parameters]
+        leaders = _drop_duplicates(problem, [*best_designs, *_list_leaders(state)], tuning.alike_designs)
         state = state.with_program(formulate(state.part, (*trial.end.nlp.cases, *new_cases)))
-        state = policy.accept(try_starts(state, (Start(d) for d in leaders), exhaustive))
+        state = policy.accept(try_starts(state, (Start(d) for d in leaders), exhaustive_policy))
         if _is_worse_than_leaders(state, leaders):
-            state = policy.accept(try_starts(state, (Start(d, near=False) for d in leaders), exhaustive))
+            state = policy.accept(try_starts(state, (Start(d, near=False) for d in leaders), exhaustive_policy))
             if not problem.asks_radius and _is_worse_than_leaders(state, leaders):
                 state = policy.accept(try_starts(state, policy.starts(state), policy))
         if state.interrupted:
@@ -104,12 +106,12 @@ def cover_cases(state: SearchState, policy: Policy, starts: Starts) -> Outcome |
     if state.best is None:
         return None
     cases = state.best.end.nlp.cases
-    listed_cases = merge_cases(problem, worst or find_worst_cases(problem, state.best.parameters))
+    listed_cases = merge_cases(problem, worst_cases or find_worst_cases(problem, state.best.parameters))
     return assess_best(state, starts, (*cases, *(c for c in listed_cases if c not in cases)))
 
 
 def _is_worse_than_leaders(state: SearchState, leaders: Sequence[Mapping[str, float]]) -> bool:
-    """Whether the best design is worse, in the cases of the program, than a design that was a start."""
+    """Whether the best design is worse, in the cases of the program, than one of these starts."""
     if state.best is None:
         return True
     if state.problem.objective is None:
@@ -120,8 +122,8 @@ def _is_worse_than_leaders(state: SearchState, leaders: Sequence[Mapping[str, fl
     return value > best_known and not same_objective(value, best_known, state.nlp.size, state.tuning.same)
 
 
-def _find_uncovered_cases(problem: Posed, trial: CheckedEnd, worst_cases: Mapping[str, Worst]) -> list[Case]:
-    """Find cases in which a design is worse than in all cases for which it was made."""
+def _find_worse_cases(problem: Posed, trial: CheckedEnd, worst_cases: Mapping[str, Worst]) -> list[Case]:
+    """Find cases in which a design is worse than in all cases of its program."""
     cases, checked = list[Case](), trial.checked
     values = {**checked.quantities, "abscissa": checked.structure.abscissa}
     for name, worst in worst_cases.items():
@@ -137,8 +139,8 @@ def _find_uncovered_cases(problem: Posed, trial: CheckedEnd, worst_cases: Mappin
     return cases
 
 
-def _select_apart(problem: Posed, designs: Sequence[Mapping[str, float]], share: float) -> list[Mapping[str, float]]:
-    """Return the designs without those that nearly equal an earlier one."""
+def _drop_duplicates(problem: Posed, designs: Sequence[Mapping[str, float]], share: float) -> list[Mapping[str, float]]:
+    """Return the designs, without those that nearly equal an earlier design."""
     selection: list[Mapping[str, float]] = []
     for design in designs:
         if not any(is_close(problem, design, other, share) for other in selection):

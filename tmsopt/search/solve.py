@@ -36,34 +36,33 @@ UNSTABLE = "no stable design was found that meets the other limits"
 """Note for a problem with a limit on stability and no stable design found."""
 
 _SOLVE_DEFAULTS = replace(DEFAULTS, stability=5.0, interruptible=True)
-_SAME_VALUE = (
-    1e-6  # relative and absolute: difference of a value in doubles from the exact one, above which rounding decided
-)
+# If a value in doubles differs from the exact value by more, relatively and absolutely, rounding errors determine it.
+_VALUE_TOLERANCE = 1e-6
 SearchedPart = tuple[SearchState, Outcome | None]
 """The final state of the search of one part of the box, and its best design."""
 
-_STARTS_NEAR = 4  # from a design that branch and bound found, and from designs near it
+_STARTS_NEAR = 4  # starts at and near a design that branch and bound found
 
 
 @documents_options(SolveOptions, _SOLVE_DEFAULTS)
 def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **options: Unpack[SolveOptions]) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
-    Ctrl-C stops the search and returns the best design so far, ``not_converged`` and `interrupted`; a second Ctrl-C
-    stops at once.
+    Ctrl-C stops the search. The result is then the best design so far, with the status ``not_converged`` and
+    `interrupted` = True. A second Ctrl-C stops immediately.
 
     Args:
         problem: the problem, or the path of its file.
         throw: whether to raise NotSolved unless the status is ``optimal``; if False, return the best point.
-        policy: how to search each part of the box; see `tmsopt.Policy`. Two searches do not use it: the robustness
-            radius first has its own, and the advice for infeasible problems uses `tmsopt.POLICY`.
+        policy: how to search each part of the box; see `tmsopt.Policy`. Two searches do not use it: the search for the
+            largest robustness radius, and the search for the smallest change of limits of an infeasible problem.
         options: ``starts``, ``seed``, ``exhaustive``, ``linear_solver``, ``progress``, ``near``, ``alone``,
             ``stability`` and ``interruptible``; see `tmsopt.Options`.
 
     Raises:
         NotSolved: with the best point found, if `throw`.
         InputError: for free parameters without an objective, constraint or pattern, or for an invalid policy.
-        KeyboardInterrupt: if the user stops it before any design is found, or `interruptible` is False.
+        KeyboardInterrupt: if the user stops the search before any design is found, or if `interruptible` is False.
 
     Example:
         >>> design = tmsopt.solve("problems/ep4.toml")
@@ -81,28 +80,31 @@ def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **opti
 
 
 def solve_any_status(
-    design: Given,
+    problem: Given,
     options: Options = DEFAULTS,
     extra_starts: Sequence[Mapping[str, float]] = (),
     without_sample: bool = False,
     skipped_parts: Collection[str] = (),
-    bound: bool = True,
+    with_bound: bool = True,
     policy: Policy = POLICY,
 ) -> Solution:
-    """Solve a problem or a file, whatever the status; return a solution as it is.
+    """Solve a problem or a file; raise no error if it has no optimum. Return a `Solution` unchanged.
 
     Args:
         extra_starts: designs to start from that may be close to the optimum.
-        without_sample: whether to start only from these and from the problem's start, and to skip `add_cover`.
+        without_sample: whether to start only from these designs and from the problem's start; this also skips
+            `add_worst_case_proof`.
         skipped_parts: parts of the box that are not searched, such as ``normal rake``.
-        bound: whether to add a bound on the best possible objective.
+        with_bound: whether to add a bound on the best possible objective.
     """
-    if isinstance(design, Solution):
-        return design
-    problem = as_solvable(design)
+    if isinstance(problem, Solution):
+        return problem
+    problem = as_solvable(problem)
     began = time.perf_counter()
     if not problem.free:
-        return add_cover(_assemble(problem, assess_design(problem, {}, fixed=True), (), {}, began, bound))
+        return add_worst_case_proof(
+            _assemble(problem, assess_design(problem, {}, is_fixed=True), (), {}, began, with_bound)
+        )
     if options.near:
         _check_near(problem, options.near)
         near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
@@ -112,28 +114,30 @@ def solve_any_status(
         s for s in begin_search(problem, options, tuple(extra_starts), policy.tuning) if s.side not in skipped_parts
     ]
     searched_parts = _search_sides(states, policy)
-    best, interrupted = _pick_best(problem, searched_parts), any(state.interrupted for state, _ in searched_parts)
+    best, is_interrupted = _pick_best(problem, searched_parts), any(state.interrupted for state, _ in searched_parts)
     try:
-        if interrupted:
+        if is_interrupted:
             raise KeyboardInterrupt
         outcome = best or explain_infeasible(problem, [state for state, _ in searched_parts], policy)
     except KeyboardInterrupt:
         if not options.interruptible:
             raise
-        interrupted, outcome = True, _find_best_so_far(problem, searched_parts, best)
-    judged = sum(len(state.sample.box.draws) for state, _ in searched_parts if state.sample)
-    outcome = replace(outcome, starts=replace(outcome.starts, looked=judged))
+        is_interrupted, outcome = True, _find_best_so_far(problem, searched_parts, best)
+    sampled_count = sum(len(state.sample.box.draws) for state, _ in searched_parts if state.sample)
+    outcome = replace(outcome, starts=replace(outcome.starts, looked=sampled_count))
     notes = (*_describe_sides(problem, searched_parts, outcome), *sense_notes(problem))
-    sides = {
-        state.side: o.checked.objective if o and o.status == "optimal" else math.nan for state, o in searched_parts
+    objective_by_side = {
+        state.side: o.checked.objective if o and o.status == "optimal" else math.nan
+        for state, o in searched_parts
+        if state.side
     }
-    solution = _assemble(problem, outcome, notes, {n: value for n, value in sides.items() if n}, began, bound)
-    solution = replace(solution, interrupted=interrupted)
-    solution = solution if without_sample else add_cover(solution)
-    if interrupted or not options.stability or options.near:
+    solution = _assemble(problem, outcome, notes, objective_by_side, began, with_bound)
+    solution = replace(solution, interrupted=is_interrupted)
+    solution = solution if without_sample else add_worst_case_proof(solution)
+    if is_interrupted or not options.stability or options.near:
         return solution
     try:
-        solution = _add_stability(solution, options, began, policy)
+        solution = _search_stable_design(solution, options, began, policy)
         return add_required_speed(solution, options)
     except KeyboardInterrupt:
         if not options.interruptible:
@@ -143,21 +147,21 @@ def solve_any_status(
 
 
 def _check_near(problem: Posed, near: Mapping[str, float]) -> None:
-    """Check that a design to start near names parameters and has numbers.
+    """Check the design in the option `near`: its keys must be parameters, its values must be numbers.
 
     Raises:
         InputError: with all faults.
     """
     names = problem.parameter_set.names
     faults = [Fault(f"unknown parameter '{n}'; {suggest(str(n), names)}", ("near",)) for n in near if n not in names]
-    wrong = (n for n, value in near.items() if not is_number(value))
-    faults += [Fault(f"found {short(near[n])}; accepted: a finite number", ("near", n)) for n in wrong]
+    no_numbers = ((n, value) for n, value in near.items() if not is_number(value))
+    faults += [Fault(f"found {short(value)}; accepted: a finite number", ("near", n)) for n, value in no_numbers]
     if faults:
         raise InputError(faults)
 
 
 def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[SearchedPart]:
-    """Search each part of the box, that with the best sampled design first; return the parts in the given order."""
+    """Search the parts of the box, beginning with the part that has the best sampled design; return all in order."""
     if len(states) > 1:
         begin(states[0].options.progress, "looking at designs")
         states = [replace(state, sample=policy.sample(state)) for state in states]
@@ -169,21 +173,21 @@ def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[Searche
     return [searched_parts[state.side] for state in states if state.side in searched_parts]
 
 
-def add_cover(solution: Solution) -> Solution:
-    """Add to an optimum the proof that no case between the listed ones is worse, if the problem has such cases."""
+def add_worst_case_proof(solution: Solution) -> Solution:
+    """Try to prove that an optimum has no worse case between the listed cases; add the result to the optimum."""
     problem = solution.problem.posed
     if solution.status != "optimal" or solution.cover or not (problem.scenarios or problem.tolerances):
         return solution
     return replace(solution, cover=prove_worst_case(problem, solution.parameters, solution.abscissa))
 
 
-def solve_if_needed(design: Given, progress: Listener | None) -> Solution:
-    """Solve a problem or a file with default options, whatever the status; return a solution as it is."""
-    return solve_any_status(design, replace(DEFAULTS, progress=steps_for(progress)))
+def solve_if_needed(problem: Given, progress: Listener | None) -> Solution:
+    """Solve a problem or a file with default options, as `solve_any_status`. Return a `Solution` unchanged."""
+    return solve_any_status(problem, replace(DEFAULTS, progress=steps_for(progress)))
 
 
 def evaluate_design(problem: Posed, design: Mapping[str, float], note: str) -> Solution:
-    """Recheck a design from elsewhere: ``not_converged``, or ``infeasible`` if it violates a limit."""
+    """Recheck a design that this search did not find. Its status is ``infeasible`` or ``not_converged``."""
     return _assemble(problem, assess_design(problem, design, note), (), {}, time.perf_counter())
 
 
@@ -191,7 +195,7 @@ def _find_best_so_far(problem: Posed, searched_parts: Sequence[SearchedPart], ou
     """Return the best design of an interrupted search, among the ends and the sampled designs.
 
     Raises:
-        KeyboardInterrupt: if there is none.
+        KeyboardInterrupt: if there is no design yet.
     """
 
     def rank(outcome: Outcome) -> tuple[float, float]:
@@ -214,7 +218,7 @@ def _find_best_so_far(problem: Posed, searched_parts: Sequence[SearchedPart], ou
     return replace(best, starts=starts, formulation=formulation, notes=(words,))
 
 
-def _add_stability(solution: Solution, options: Options, began: float, policy: Policy) -> Solution:
+def _search_stable_design(solution: Solution, options: Options, began: float, policy: Policy) -> Solution:
     """If no stable design was found, search for one by branch and bound, and solve again from it."""
     problem = solution.problem.posed
     if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
@@ -226,26 +230,26 @@ def _add_stability(solution: Solution, options: Options, began: float, policy: P
     if answer.design is not None:
         words = "this design was reached from a stable design that branch and bound found"
         solution = _solve_near(solution, answer.design, words, options, policy)
-    elif answer.any is False:
+    elif answer.exists is False:
         solution = replace(solution, notes=(*solution.notes, f"no stable design exists, proved {answer.proof}"))
-    if answer.failed:
-        words = f"the search for a stable design failed: {answer.failed}"
+    if answer.failure:
+        words = f"the search for a stable design failed: {answer.failure}"
         solution = replace(solution, notes=(*solution.notes, words))
-    return replace(solution, stable_elsewhere=answer.any, seconds=time.perf_counter() - began)
+    return replace(solution, stable_elsewhere=answer.exists, seconds=time.perf_counter() - began)
 
 
 def _solve_near(
     solution: Solution, design: Mapping[str, float], words: str, options: Options, policy: Policy
 ) -> Solution:
-    """Solve again near a design that the search has missed; keep the solution unless the new one is better."""
+    """Solve again near a design that the search missed; return the new solution if it is better, else the old one."""
     problem = solution.problem.posed
     short_options = replace(
         options, starts=min(options.starts, _STARTS_NEAR), stability=0.0, alone=False, interruptible=False
     )
-    retry = solve_any_status(problem, replace(short_options, near=design), policy=policy)
-    gain = problem.sign * (solution.value - retry.value)
-    better = retry.status == "optimal" and (solution.status != "optimal" or gain > 0)
-    return replace(retry, notes=(*retry.notes, words)) if better else solution
+    new_solution = solve_any_status(problem, replace(short_options, near=design), policy=policy)
+    gain = problem.sign * (solution.value - new_solution.value)
+    is_better = new_solution.status == "optimal" and (solution.status != "optimal" or gain > 0)
+    return replace(new_solution, notes=(*new_solution.notes, words)) if is_better else solution
 
 
 def _pick_best(problem: Posed, searched_parts: Sequence[SearchedPart]) -> Outcome | None:
@@ -258,7 +262,7 @@ def _pick_best(problem: Posed, searched_parts: Sequence[SearchedPart]) -> Outcom
 
 
 def _describe_sides(problem: Posed, searched_parts: Sequence[SearchedPart], best: Outcome) -> tuple[str, ...]:
-    """Write a note on which part of the box has the best design, and what the other part has."""
+    """Write a note that says which part of the box has the best design, and what the other part has."""
     best_side = next((state.side for state, o in searched_parts if o and o.parameters == best.parameters), None)
     if len(searched_parts) == 1 or best_side is None or best.status != "optimal":
         return ()
@@ -284,22 +288,27 @@ def _assemble(
     problem: Posed,
     outcome: Outcome,
     notes: tuple[str, ...],
-    sides: dict[str, float],
+    objective_by_side: dict[str, float],
     began: float,
-    bound: bool = True,
+    with_bound: bool = True,
 ) -> Solution:
-    stored = find_storable_design(problem, outcome.parameters, outcome.checked, outcome.cases)
-    parameters, checked, rounding_excess = stored
+    """Round the design of an outcome to doubles, compute its exact numbers, and make the `Solution`."""
+    parameters, checked, rounding_excess = find_storable_design(
+        problem, outcome.parameters, outcome.checked, outcome.cases
+    )
     outcome = replace(outcome, parameters=parameters, checked=checked)
     numbers = certified_numbers(problem, outcome.parameters, checked, outcome.cases)
-    confirmed = math.isclose(numbers.value, checked.objective, rel_tol=_SAME_VALUE, abs_tol=_SAME_VALUE)
-    if outcome.status == "optimal" and problem.free and problem.objective is not None and not confirmed:
+    is_confirmed = math.isclose(numbers.value, checked.objective, rel_tol=_VALUE_TOLERANCE, abs_tol=_VALUE_TOLERANCE)
+    if outcome.status == "optimal" and problem.free and problem.objective is not None and not is_confirmed:
         outcome = replace(outcome, status="not_converged", notes=(*outcome.notes, UNCLEAR))
-    optimal, has_cases = outcome.status == "optimal", bool(problem.scenarios or problem.tolerances)
-    name, worst = user_structure_name(problem.model, checked.structure.name), checked.worst.applied(parameters)
+    is_optimal, has_cases = outcome.status == "optimal", bool(problem.scenarios or problem.tolerances)
+    name = user_structure_name(problem.model, checked.structure.name)
+    worst_parameters = checked.worst.applied(parameters)
     all_roots = polynomial_structure(problem.model, name, numbers.roots).roots
-    meetings = every_meeting(problem, worst, all_roots, () if checked.crossing else checked.violations)
-    edges, certain = find_edges(problem, worst, checked.structure, optimal, numbers.abscissa, meetings)
+    multiple_roots = every_meeting(problem, worst_parameters, all_roots, () if checked.crossing else checked.violations)
+    edges, is_certain = find_edges(
+        problem, worst_parameters, checked.structure, is_optimal, numbers.abscissa, multiple_roots
+    )
     return Solution(
         problem=problem.problem,
         status=outcome.status,
@@ -309,10 +318,10 @@ def _assemble(
         abscissa_realised=numbers.realised,
         roots=remove_rounding(problem.model, numbers.roots),
         structure=name,
-        active=Table(outcome.active),
+        active=Table(outcome.active_gains),
         violations=checked.amounts,
         missed=Table(rounding_excess),
-        bound=bound_without_search(problem, outcome.status, numbers.value) if bound else Bound(),
+        bound=bound_without_search(problem, outcome.status, numbers.value) if with_bound else Bound(),
         starts=outcome.starts,
         seconds=time.perf_counter() - began,
         quantities=numbers.quantities,
@@ -324,44 +333,48 @@ def _assemble(
             *outcome.notes,
             *missed_note(problem, rounding_excess),
             *notes,
-            *_describe_stability(problem, checked, edges, optimal),
+            *_describe_stability(problem, checked, edges, is_optimal),
         ),
         worst=checked.worst if has_cases else None,
         least_damped=checked.least_damped if has_cases else None,
         fastest=checked.fastest if has_cases and problem.asks(ANGULAR_FREQUENCY) else None,
-        sides=Table(sides),
+        sides=Table(objective_by_side),
         relaxation=outcome.relaxation,
-        meetings=meetings,
+        meetings=multiple_roots,
         edges=edges,
-        edge_is_exact=certain,
-        multiple_as_rounded=bool(meetings) and not problem.free and not is_exactly_multiple(problem, worst, all_roots),
-        without_best=outcome.without_best,
+        edge_is_exact=is_certain,
+        multiple_as_rounded=bool(multiple_roots)
+        and not problem.free
+        and not is_exactly_multiple(problem, worst_parameters, all_roots),
+        without_best=outcome.has_no_best_design,
         si=numbers.si,
     )
 
 
-def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str], optimal: bool) -> tuple[str, ...]:
+def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str], is_optimal: bool) -> tuple[str, ...]:
+    """Write a note on the stability of a design; none if there is nothing to say."""
     if "coefficients" in checked.violations:
         return (
-            "a coefficient has no value at this design; exclude division by 0 or roots of negatives by a constraint",
+            "a coefficient has no value at this design; add a constraint that excludes a division by 0 or a square "
+            "root of a negative number",
         )
     if "a0" in checked.violations:
         return (f"the mass matrix is singular (a0 = 0), so a root is at infinity; {write_mass_advice(problem)}",)
     violated_limits = [n for n, c in problem.conditions.items() if n in checked.violations and "abscissa" in c.names]
-    unstable = (UNSTABLE,) if violated_limits and checked.structure.abscissa >= 0 else ()
-    real_part = beyond_axis(problem.model, problem.located, checked.structure.roots) if optimal else None
+    unstable_note = (UNSTABLE,) if violated_limits and checked.structure.abscissa >= 0 else ()
+    real_part = beyond_axis(problem.model, problem.located, checked.structure.roots) if is_optimal else None
     if real_part:
-        another = "root has real part" if problem.model.carrier is None else "eigenfrequency has gain"
-        return (f"not the edge of stability: another {another} {unit_of(problem, 'abscissa').show(real_part, 2)}",)
-    if unstable or not optimal or checked.structure.abscissa < 0:
-        return unstable
+        words = "root has real part" if problem.model.carrier is None else "eigenfrequency has gain"
+        return (f"not the edge of stability: another {words} {unit_of(problem, 'abscissa').show(real_part, 2)}",)
+    if unstable_note or not is_optimal or checked.structure.abscissa < 0:
+        return unstable_note
     largest = max((r.size for r in checked.structure.roots), default=0.0)
     verdict = stability((checked.structure.abscissa, checked.realised), edges, largest=largest)
     if problem.free and minimizes_abscissa(problem):
-        at_edge = (
+        edge_note = (
             "no design that decays was found in the box; at abscissa 0, multiple roots decide whether motions grow"
         )
         return (
-            at_edge if verdict.on_edge else "no stable design was found in the box; this is the least unstable one",
+            edge_note if verdict.on_edge else "no stable design was found in the box; this is the least unstable one",
         )
     return () if verdict.on_edge else ("the design is not stable: abscissa >= 0",)

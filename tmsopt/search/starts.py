@@ -1,4 +1,4 @@
-"""Designs to start from: the caller's, then refined and bold designs of the sample in turn, then quasi-random ones."""
+"""Designs to start from: first the caller's, then refined and bold designs of the sample in turn, then random ones."""
 
 from collections.abc import Iterator
 from itertools import zip_longest
@@ -9,7 +9,7 @@ from tmsopt.search.state import SearchState, Start, is_inside
 
 
 def sample_part(state: SearchState) -> Sample | None:
-    """Sample the part; None if arrays cannot judge the problem because it asks for a pattern or the radius."""
+    """Sample the part of the box; None for a problem with a pattern or the radius, which arrays cannot judge."""
     if state.part.pattern is not None or state.part.asks_radius:
         return None
     return sample_box(state.part, state.options.seed, state.tuning)

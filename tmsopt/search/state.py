@@ -44,11 +44,12 @@ class LocalEnd:
 
     Attributes:
         start: the start.
-        nlp: the program with the limits that were active.
-        objective: of the NLP, plus what its rows may gain by rounding; less is better, whether the problem minimises
-            or maximises; inf where it has no value.
-        feasible: whether the rows hold at IPOPT's end, the factors cover all roots, and located roots have Jordan
-            chains; the recheck may still find a violated limit.
+        nlp: the variant of the program that was solved.
+        run: the result of IPOPT.
+        objective: objective of the NLP, plus the amount by which rounding errors of its rows may have improved it;
+            less is better, whether the problem minimises or maximises; inf if the objective has no value.
+        feasible: whether the rows hold, the factors cover all roots, and located roots have Jordan chains; the recheck
+            may still find a violated limit.
         crossing: whether the end is infeasible only because these chains are missing.
         led: rows of the sample's designs from which the objective falls along a straight line to this end.
 
@@ -75,7 +76,7 @@ class LocalEnd:
 
     @property
     def weight(self) -> int:
-        """For how many starts the end counts: a sampled design that leads straight to the end counts as a start."""
+        """Number of starts for which the end counts: its own start, and each sampled design in `led`."""
         return 1 + len(self.led)
 
     @property
@@ -85,7 +86,7 @@ class LocalEnd:
 
 
 def make_failed_end(start: Start, nlp: NLP) -> LocalEnd:
-    """Make an infeasible end for a start from which no solve was possible."""
+    """Make an infeasible end for a start that cannot be solved."""
     return LocalEnd(start, nlp, Run(np.full(len(nlp.variables), np.nan), np.empty(0), np.empty(0), ""), math.inf, False)
 
 
@@ -94,6 +95,7 @@ class CheckedEnd:
     """A polished and rechecked end.
 
     Attributes:
+        end: the end before polishing.
         point: the polished end.
         parameters: every parameter of the design there.
         checked: the result of the recheck.
@@ -139,15 +141,15 @@ class SearchState:
     """A search of one part of the box.
 
     Attributes:
-        problem: as posed.
+        problem: the problem as posed.
         part: the problem on the part of the box that is searched, e.g. one sign of one parameter.
         side: name of the part, e.g. ``normal rake``; empty for the whole box.
         nlp: the program to solve from each start.
-        extra: designs that may be close to the optimum.
-        sample: of the part; None if arrays cannot judge the problem, or the policy takes no sample.
+        extra: designs to start from that may be close to the optimum.
+        sample: sample of the part; None if arrays cannot judge the problem, or the policy takes no sample.
         ends: ends of the starts, in order.
         accepted: how many of the ends were considered for `best`.
-        best: the best end that passed the recheck, or the one that fails it least.
+        best: the best end that passed the recheck, or else the end that fails it least.
         fallback: a design to return instead of `best`, though it is no optimum either.
         interrupted: whether the user stopped the search.
 
@@ -191,7 +193,7 @@ class SearchState:
 
     @property
     def out_of_reach(self) -> bool:
-        """Whether all sampled designs are far from meeting the limits, even if the pattern is left out."""
+        """Whether all sampled designs are far from meeting the limits, even without the pattern."""
         sample = self.limits_sample
         return sample is not None and sample.out_of_reach
 
@@ -221,8 +223,8 @@ class SearchState:
     def coefficients_at(self, end: LocalEnd) -> Array:
         """Return the coefficients at an end in every case, shape (cases, n + 1)."""
         nominal = self.part.ordered(self.design_at(end))
-        varied = [case.applied(nominal) for case in end.nlp.cases if not case.direction] or [nominal]
-        return np.array([[float(c) for c in self.part.values(p).coefficients] for p in varied])
+        designs = [case.applied(nominal) for case in end.nlp.cases if not case.direction] or [nominal]
+        return np.array([[float(c) for c in self.part.values(p).coefficients] for p in designs])
 
     def recheck(self, design: Mapping[str, float]) -> Evaluation:
         """Recheck a design in the cases of the program."""
@@ -246,10 +248,10 @@ def begin_search(
     """
     parts = {"": problem}
     for name, (lower, upper) in problem.free.items():
-        sides = problem.parameter_set[name].sides
-        if sides is not None and lower < -tuning.thin and upper > tuning.thin:
+        side_names = problem.parameter_set[name].sides
+        if side_names is not None and lower < -tuning.thin and upper > tuning.thin:
             parts = {}
-            for side, low, high in ((sides[1], 0.0, upper), (sides[0], lower, 0.0)):
+            for side, low, high in ((side_names[1], 0.0, upper), (side_names[0], lower, 0.0)):
                 start = problem.start if low <= problem.start.get(name, low) <= high else {}
                 parts[side] = problem.derive(free={**problem.free, name: (low, high)}, start=start)
             break
@@ -282,5 +284,5 @@ def same_objective(a: float, b: float, size: float = 1.0, tolerance: float = TUN
 
 @lru_cache(maxsize=8)
 def sample_limits(problem: Posed, seed: int, tuning: Tuning) -> Sample:
-    """Sample a problem without its pattern, for its limits alone."""
+    """Sample a problem without its pattern, to see whether its limits can be met."""
     return sample_box(problem.derive(locate=None), seed, tuning)

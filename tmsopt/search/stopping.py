@@ -1,4 +1,4 @@
-"""Decide when a search ends: at a proven bound, when it is hopeless, or by the rule of `Starts`."""
+"""Decide when a search ends: at a proven bound, after too many failures, or if few better optima are expected."""
 
 import math
 from collections.abc import Sequence
@@ -13,39 +13,39 @@ from tmsopt.search.tuning import TUNING
 def is_enough(state: SearchState) -> bool:
     """Whether more starts are unlikely to help.
 
-    A search ends when few better optima are expected (`expects_few_better`), when a design reaches a proven bound, when
-    a pattern without freedom or objective is met once, or when too many starts fail.
+    A search ends when few better optima are expected (see `Starts.suffice`), when a design reaches a proven bound, or
+    when too many starts fail. Without an objective, it ends at the first solution, or if solutions form a continuum,
+    when several starts agree.
     """
     tuning, feasible, sample = state.tuning, state.feasible, state.sample
     if not feasible:
         return is_hopeless(state)
     best, count = min(end.objective for end in feasible), len(state.ends)
     starts = count_starts(state.ends, best, tuning.same)
-    # Without an objective, any solution will do; where solutions form a continuum, several starts must agree.
     if state.problem.objective is None:
         freedom = degrees_of_freedom(state.part).count
-        is_met = freedom == 0 or (freedom < 0 and best <= tuning.met_conditions)
-        return starts.at_best >= (1 if is_met else tuning.agree)
+        is_isolated = freedom == 0 or (freedom < 0 and best <= tuning.met_conditions)
+        return starts.at_best >= (1 if is_isolated else tuning.agree)
     if state.ends[-1].objective == best and is_proven(state, state.ends[-1]):
         return True
     if sample is None:
         return count >= tuning.fewest_blind and starts.at_best >= tuning.agree and starts.suffice()
-    unled_count = sum(bool(sample.refined.violation[row] == 0) for row in state.left if row < len(sample.refined))
-    has_minimum = count >= tuning.fewest_narrow or not sample.box.narrow
+    separate_count = sum(bool(sample.refined.violation[row] == 0) for row in state.left if row < len(sample.refined))
+    can_end = count >= tuning.fewest_narrow or not sample.box.is_narrow
     # A sampled design that leads straight to no end may lie in a basin of its own.
-    return (has_minimum and starts.suffice(unled_count)) or count - len(feasible) >= 2 * tuning.hopeless
+    return (can_end and starts.suffice(separate_count)) or count - len(feasible) >= 2 * tuning.hopeless
 
 
 def is_hopeless(state: SearchState) -> bool:
-    """Whether so many starts failed that more would fail too."""
-    tuning, sample, failed = state.tuning, state.sample, len(state.ends) - len(state.feasible)
-    if failed >= tuning.hopeless_afar and (sample.far_off if sample else state.out_of_reach):
+    """Whether so many starts failed that others are unlikely to succeed."""
+    tuning, sample, failure_count = state.tuning, state.sample, len(state.ends) - len(state.feasible)
+    if failure_count >= tuning.hopeless_afar and (sample.is_far_off if sample else state.out_of_reach):
         return True
-    return failed >= (tuning.hopeless if sample else 2 * tuning.hopeless)
+    return failure_count >= (tuning.hopeless if sample else 2 * tuning.hopeless)
 
 
 def is_proven(state: SearchState, end: LocalEnd) -> bool:
-    """Whether an end reaches a proven bound; tested only where all roots have nearly the same modulus."""
+    """Whether an end reaches a proven bound; False unless all roots have nearly the same modulus."""
     problem = state.part
     if not (end.feasible and minimizes_abscissa(problem)):
         return False
@@ -56,7 +56,7 @@ def is_proven(state: SearchState, end: LocalEnd) -> bool:
 
 
 def count_starts(ends: Sequence[LocalEnd], best: float, tolerance: float = TUNING.same) -> Starts:
-    """Count starts by how they ended; a sampled design that leads straight to an end counts as a start."""
+    """Count starts by their ends; a sampled design that leads straight to an end counts as a start."""
     feasible = [end for end in ends if end.feasible]
     objectives = sorted(end.objective for end in feasible)
     size = ends[0].nlp.size if ends else 1.0

@@ -23,16 +23,16 @@ from tmsopt.search.search import POLICY
 from tmsopt.search.state import CheckedEnd, SearchState, Start, begin_search, clip_to_box, same_objective
 
 _MAX_ROUNDS = 12  # times that cases are added
-_MAX_STARTS = 8  # of a relaxation
-_STARTS_ALONE = 2  # sampled designs from which the relaxation of one limit alone starts
+_MAX_STARTS = 8  # starts of the search for a relaxation
+_SINGLE_LIMIT_STARTS = 2  # sampled designs from which the relaxation of a single limit starts
 _AGREEING_STARTS = 3  # starts that must end at the best value before the search may end
-_TIE = 1e-3  # relative difference of the scales of equal limits, so that one of them moves and not each by half
+_TIE = 1e-3  # relative difference of the scales of equal limits, so that one of them moves instead of each by half
 _MAX_WIDENING = 3.0  # widths of a range by which its ends may move
-_INSET = 1e-3  # of the width: distance kept from a physical end that is excluded
-_MIN_MULTIPLIER = 1e-5  # of a limit in the conflict, per scale of the limit or width of the range
+_INSET = 1e-3  # relative to a width: distance kept from an excluded end of a physical range
+_MIN_MULTIPLIER = 1e-5  # per scale of a limit, or width of a range: a limit with a smaller multiplier is not active
 _ZERO_SUM = 1e-12  # sum of amounts below which the problem is feasible
-_FINE_STEPS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # of the box; they refine the best sampled design
-_ROUND_UP = 1e-12  # of an amount, added so that the design is inside the relaxed limits
+_FINE_STEPS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # relative to the box: step sizes that refine the best sampled design
+_ROUND_UP = 1e-12  # relative increase of an amount, so that the design is inside the relaxed limits
 
 
 @dataclass(frozen=True)
@@ -41,25 +41,26 @@ class Limit:
 
     Attributes:
         scale: the amount that counts as 1 in sums.
-        parameter, end: parameter and value of an end of a range; empty and 0 for a constraint.
-        upper: whether this is the upper end.
+        parameter: the parameter, if the limit is an end of a range; empty for a constraint.
+        end: value of the end of the range; 0 for a constraint.
+        is_upper: whether this is the upper end.
     """
 
     name: str
     scale: float
     parameter: str = ""
     end: float = 0.0
-    upper: bool = False
+    is_upper: bool = False
 
 
 @dataclass(frozen=True)
 class ElasticProblem:
-    """A problem of which some limits may move: the sum of the amounts, each in units of its scale, is minimised.
+    """A problem in which some limits may move; the sum of the amounts, each in units of its scale, is minimised.
 
     Attributes:
         problem: the problem in the box that is searched.
         limits: limits that may move; all others stay.
-        sample: of the box, to start from.
+        sample: sample of the box, to start from.
     """
 
     problem: Posed
@@ -70,15 +71,15 @@ class ElasticProblem:
     def find_least_relaxation(
         self, designs: Sequence[Mapping[str, float]] = ()
     ) -> tuple[Relaxation, CheckedEnd | None] | tuple[None, None]:
-        """Return the least relaxation, and its end if it is not a known design; (None, None) if there is none."""
+        """Return the least relaxation, and its end unless it is from a known design; (None, None) if there is none."""
         states = begin_search(self.problem, self.options)
-        sides = [replace(self, problem=state.part, sample=POLICY.sample(state)) for state in states]
-        ends = [end for side in sides if (end := side._find_least_in_cases())]
+        parts = [replace(self, problem=state.part, sample=POLICY.sample(state)) for state in states]
+        ends = [end for part in parts if (end := part._find_least_in_cases())]
         trial = min(ends, key=lambda end: end.point.objective, default=None)
         candidates = (
             []
             if self.problem.cases
-            else [candidate for side in sides if (candidate := side._relax_known_designs(designs))]
+            else [candidate for part in parts if (candidate := part._relax_known_designs(designs))]
         )
         least_sum, relaxation = min(candidates, key=lambda candidate: candidate[0], default=(np.inf, None))
         amounts = self._compute_amounts(trial.parameters, trial.end.nlp.cases) if trial else {}
@@ -117,8 +118,8 @@ class ElasticProblem:
         movable = [limit for limit in self.limits if not limit.parameter]
         if trial and self.options.starts >= _MAX_STARTS and trial.point.objective > _ZERO_SUM and len(movable) > 1:
             box = draw_box(self.problem.derive(locate=None), self.options.seed)
-            lead_designs = {tuple(d.values()): d for limit in movable for d in _propose_designs(box, limit.name)}
-            second_trial = self._solve(trial.end.nlp, list(lead_designs.values()))
+            start_designs = {tuple(d.values()): d for limit in movable for d in _propose_designs(box, limit.name)}
+            second_trial = self._solve(trial.end.nlp, list(start_designs.values()))
             if second_trial and second_trial.point.objective < trial.point.objective * (1 - _TIE):
                 trial = second_trial
         for _ in range(_MAX_ROUNDS if cases else 0):
@@ -140,19 +141,19 @@ class ElasticProblem:
 
     def _relax_known_designs(self, designs: Sequence[Mapping[str, float]]) -> tuple[float, Relaxation] | None:
         """Return the least sum of amounts among known designs and the best sampled design, with its relaxation."""
-        candidates, unlimited, sample = list(designs), self._drop_limits(), self.sample
+        candidates, fixed_problem, sample = list(designs), self._drop_limits(), self.sample
         if sample:
             candidates += sample.box.designs(sample.box.refine(sample.refined.take_first(1), _FINE_STEPS))
-        needs = [(p, self._compute_amounts(p, ())) for p in map(self.problem.ordered, candidates)]
-        for parameters, amounts in sorted(needs, key=lambda need: self.sum_amounts(need[1])):
-            if not recheck(unlimited, parameters).violations:
+        designs_with_amounts = [(p, self._compute_amounts(p, ())) for p in map(self.problem.ordered, candidates)]
+        for parameters, amounts in sorted(designs_with_amounts, key=lambda pair: self.sum_amounts(pair[1])):
+            if not recheck(fixed_problem, parameters).violations:
                 return self.sum_amounts(amounts), Relaxation(Table(parameters), Table(amounts))
         return None
 
     def _drop_limits(self) -> Posed:
         """Return the problem without its objective and without the constraints that may move."""
-        movable = {limit.name for limit in self.limits}
-        constraints = {n: c for n, c in self.problem.constraints.items() if n not in movable}
+        movable_names = {limit.name for limit in self.limits}
+        constraints = {n: c for n, c in self.problem.constraints.items() if n not in movable_names}
         return self.problem.derive(constraints=constraints, minimize=None, maximize=None)
 
     def _find_worse_cases(self, trial: CheckedEnd) -> list[Case]:
@@ -160,8 +161,8 @@ class ElasticProblem:
         cases = trial.end.nlp.cases
         worst = [w.case for w in find_worst_cases(self.problem, trial.parameters).values()]
         amounts, needed = (self._compute_amounts(trial.parameters, c) for c in (cases, (*cases, *worst)))
-        grown = any(abs(a) > abs(amounts.get(n, 0.0)) + FEASIBLE * (1 + abs(a)) for n, a in needed.items())
-        return [case for case in worst if case not in cases] if grown else []
+        has_grown = any(abs(a) > abs(amounts.get(n, 0.0)) + FEASIBLE * (1 + abs(a)) for n, a in needed.items())
+        return [case for case in worst if case not in cases] if has_grown else []
 
     def _compute_amounts(self, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:
         """Recheck a design and return the amounts that it needs."""
@@ -169,9 +170,9 @@ class ElasticProblem:
         for limit in self.limits:
             if limit.parameter:
                 excess = parameters[limit.parameter] - limit.end
-                needed[limit.name] = max(excess if limit.upper else -excess, 0.0)
+                needed[limit.name] = max(excess if limit.is_upper else -excess, 0.0)
         amounts = {limit: needed.get(limit.name, 0.0) for limit in self.limits}
-        return {n.name: a * (1 + _ROUND_UP) for n, a in amounts.items() if abs(a) > FEASIBLE * n.scale}
+        return {k.name: a * (1 + _ROUND_UP) for k, a in amounts.items() if abs(a) > FEASIBLE * k.scale}
 
     def _build_program(self, cases: Sequence[Case]) -> NLP:
         """Build the program that minimises Σ slack/scale: each limit moves by its slack, all others stay."""
@@ -181,23 +182,23 @@ class ElasticProblem:
         slacks = dict(zip(names, map(symbol, slack_names), strict=True))
         _, *g = fold(nlp.formula, {n: symbol(n) for n in nlp.formula.names}, NODES)
         rows: list[tuple[str, Any, float, float]] = []
-        later_rows: list[tuple[str, Any, float, float]] = []  # last, because touches and kinks refer to rows by number
+        later_rows: list[tuple[str, Any, float, float]] = []  # last, because contacts and kinks refer to rows by index
         for name, value, lower, upper in zip(nlp.rows, g, nlp.row_lower, nlp.row_upper, strict=True):
             if name not in slacks:
                 rows.append((name, value, lower, upper))
                 continue
             sides = [(name, value - slacks[name], -np.inf, upper), (name, value + slacks[name], lower, np.inf)]
-            first, *remaining = [row for row in sides if np.any(np.isfinite(row[2:]))]
-            rows.append(first)
-            later_rows += remaining
+            row, *other_rows = [row for row in sides if np.any(np.isfinite(row[2:]))]
+            rows.append(row)
+            later_rows += other_rows
         rows += later_rows
         for limit in self.limits:
             if limit.parameter:
                 value = symbol(nlp.inputs[list(self.problem.free).index(limit.parameter)])
                 if self.problem.parameter_set[limit.parameter].tangent:
                     value = atan(value)
-                slack, ends = slacks[limit.name], (-np.inf, limit.end) if limit.upper else (limit.end, np.inf)
-                rows.append((limit.name, value - slack if limit.upper else value + slack, *ends))
+                slack, ends = slacks[limit.name], (-np.inf, limit.end) if limit.is_upper else (limit.end, np.inf)
+                rows.append((limit.name, value - slack if limit.is_upper else value + slack, *ends))
         objective = sum(slacks[limit.name] / limit.scale for limit in self.limits)
         row_names, values, row_lower, row_upper = zip(*rows, strict=True)
         return replace(
@@ -232,24 +233,24 @@ def list_stages(problem: Posed, options: Options) -> Iterator[ElasticProblem]:
 
 
 def _make_constraint_limits(problem: Posed) -> list[Limit]:
-    """Make limits of the constraints; the scale is the limit as written, or a side's size if that is 0 or no number."""
-    ends = [{n: lo + share * (hi - lo) for n, (lo, hi) in problem.free.items()} for share in (0.5, 0.3)]
-    values, other_values = (problem.values(problem.ordered(design)) for design in ends)
+    """Make limits of the constraints; the scale is the written limit, or the size of a side if it is 0 or no number."""
+    designs = [{n: lo + share * (hi - lo) for n, (lo, hi) in problem.free.items()} for share in (0.5, 0.3)]
+    values, other_values = (problem.values(problem.ordered(design)) for design in designs)
     limits: list[Limit] = []
     for name, condition in problem.conditions.items():
         pairs = list(zip(condition.sides(values), condition.sides(other_values), strict=True))
-        written = [abs(a) for a, b in pairs if a == b != 0]
+        constant_sides = [abs(a) for a, b in pairs if a == b != 0]
         sides = [abs(a) for a, _ in pairs if np.isfinite(a) and a]
-        size = min(written) if written else max(sides, default=1.0)
+        size = min(constant_sides) if constant_sides else max(sides, default=1.0)
         limits.append(Limit(name, size * (1 + _TIE * len(limits))))
     return limits
 
 
 def _make_bound_limits(problem: Posed) -> list[Limit]:
     return [
-        Limit(f"{name}.{'max' if upper else 'min'}", ends[1] - ends[0], name, ends[upper], upper)
+        Limit(f"{name}.{'max' if is_upper else 'min'}", ends[1] - ends[0], name, ends[is_upper], is_upper)
         for name, ends in problem.free.items()
-        for upper in (False, True)
+        for is_upper in (False, True)
     ]
 
 
@@ -266,30 +267,32 @@ def widen_box(problem: Posed, names: Collection[str]) -> Posed:
 
 
 def relax_each_alone(problem: Posed, options: Options, conflict: Sequence[str], trial: CheckedEnd) -> dict[str, float]:
-    """Return how far each limit of a conflict must move if no other limit moves; omit limits that cannot help alone."""
+    """Return how far each limit of a conflict must move if no other moves; omit limits for which no move is enough."""
     limits = {limit.name: limit for limit in (*_make_constraint_limits(problem), *_make_bound_limits(problem))}
     amounts: dict[str, float] = {}
     for limit in (limits[name] for name in conflict):
-        wide = widen_box(problem, [limit.parameter] if limit.parameter else [])
-        goal = {"minimize" if limit.upper else "maximize": limit.parameter} if limit.parameter else {}
-        if lead_designs := _propose_designs(draw_box(wide.derive(locate=None, **goal), options.seed), limit.name):
-            designs = [clip_to_box(wide, trial.parameters), *lead_designs]
-            amounts |= ElasticProblem(wide, [limit], options).find_amounts(designs, trial.end.nlp.cases)
+        wide_problem = widen_box(problem, [limit.parameter] if limit.parameter else [])
+        goal = {"minimize" if limit.is_upper else "maximize": limit.parameter} if limit.parameter else {}
+        if start_designs := _propose_designs(
+            draw_box(wide_problem.derive(locate=None, **goal), options.seed), limit.name
+        ):
+            designs = [clip_to_box(wide_problem, trial.parameters), *start_designs]
+            amounts |= ElasticProblem(wide_problem, [limit], options).find_amounts(designs, trial.end.nlp.cases)
     return amounts
 
 
 def _propose_designs(box: Box, name: str) -> list[dict[str, float]]:
-    """Propose designs for which it may suffice to move this limit; none if the other limits exclude each other."""
+    """Propose designs that may need a move of this limit only; none if the other limits exclude each other."""
     batch = box.ignore_limit(name)
-    return [] if batch.misses_by(box.tuning.far_off) else [*box.designs(batch.take_first(_STARTS_ALONE))]
+    return [] if batch.all_violate_by(box.tuning.far_off) else [*box.designs(batch.take_first(_SINGLE_LIMIT_STARTS))]
 
 
 def _has_least_sum(state: SearchState) -> bool:
     """Whether no limit must move, or enough starts agree on the least sum."""
     objectives = [end.objective for end in state.feasible]
     best = min(objectives, default=np.inf)
-    at_best = sum(same_objective(value, best) for value in objectives)
-    return best <= _ZERO_SUM or (at_best >= _AGREEING_STARTS and len(state.ends) >= 2 * _AGREEING_STARTS)
+    best_count = sum(same_objective(value, best) for value in objectives)
+    return best <= _ZERO_SUM or (best_count >= _AGREEING_STARTS and len(state.ends) >= 2 * _AGREEING_STARTS)
 
 
 _RELAXATION_POLICY = replace(POLICY, enough=_has_least_sum)

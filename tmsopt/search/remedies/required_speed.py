@@ -1,4 +1,4 @@
-"""Find the lowest or highest speed at which a design meets the limits on the roots, if none does in the box."""
+"""Find the lowest or highest speed at which a design meets the limits on the roots, if no design in the box does."""
 
 import math
 import time
@@ -13,12 +13,12 @@ from tmsopt.program import Options
 from tmsopt.progress import begin
 from tmsopt.records import Table
 from tmsopt.search.remedies.changed_problem import OutOfTime, limit_time, solve_again
-from tmsopt.search.remedies.conflict import STARTS, search_briefly
+from tmsopt.search.remedies.conflict import SHORT_SEARCH_STARTS, search_briefly
 from tmsopt.search.state import begin_search
 
 _MAX_SPEED = 10.0  # highest speed that is searched, in √(g w)
-_MAX_SPEED_RATIO = 4.0  # the same, in the highest speed of the problem; the larger of the two counts
-_SECONDS = 0.5  # after this time, the range of speeds below the allowed ones is not searched
+_MAX_SPEED_RATIO = 4.0  # the same limit, relative to the highest speed of the problem; the larger limit counts
+_MAX_SECONDS = 0.5  # after this time, speeds below the allowed ones are not searched
 _AT_RANGE_END = 1e-6  # relative: a speed this close to an end of its range is at that end
 
 
@@ -32,31 +32,32 @@ def add_required_speed(solution: Solution, options: Options) -> Solution:
     if not name or problem.cases or not problem.free or not _can_speed_help(solution):
         return solution
     limits = {} if problem.asked_of_roots or problem.pattern else {STABLE: "abscissa <= 0"}
-    short_options = replace(options, starts=STARTS, progress=None, near=None)
+    short_options = replace(options, starts=SHORT_SEARCH_STARTS, progress=None, near=None)
     began, searched_ends = time.perf_counter(), list[float]()
     begin(options.progress, f"searching for the {name} that makes it feasible")
-    for highest, ends in _list_ranges(problem, name):
-        goal = {"maximize": name, "minimize": None} if highest else {"minimize": name, "maximize": None}
+    for is_maximum, ends in _list_ranges(problem, name):
+        goal = {"maximize": name, "minimize": None} if is_maximum else {"minimize": name, "maximize": None}
         speed_problem = _set_range(problem, name, ends).derive(constraints={**problem.constraints, **limits}, **goal)
         searched_ends += ends
         trials = [search_briefly(state) for state in begin_search(speed_problem, short_options)]
-        designs = [t.parameters for t in trials if t and not t.checked.violations]
+        designs = [trial.parameters for trial in trials if trial and not trial.checked.violations]
         if designs:
-            design = (max if highest else min)(designs, key=lambda p: p[name])
-            if name in problem.free and math.isclose(design[name], ends[highest], rel_tol=_AT_RANGE_END):
-                return solution  # the box has such a design itself, so no other speed is required
+            design = (max if is_maximum else min)(designs, key=lambda p: p[name])
+            if name in problem.free and math.isclose(design[name], ends[is_maximum], rel_tol=_AT_RANGE_END):
+                return solution  # a speed in the box is enough
             limited_options, unit_size = limit_time(options), unit_of(problem, name).one
-            rounded = [
-                round_outwards(design[name] / unit_size, not highest, digits) * unit_size for digits in (DIGITS, 4, 2)
+            rounded_speeds = [
+                round_outwards(design[name] / unit_size, not is_maximum, digits) * unit_size
+                for digits in (DIGITS, 4, 2)
             ]
             with suppress(OutOfTime):
-                for value in dict.fromkeys(rounded):
+                for value in dict.fromkeys(rounded_speeds):
                     fixed_problem = _set_range(problem, name, (value, value))
-                    if solve_again(fixed_problem, limited_options, problem, thorough=True):
-                        need = RequiredValue(name, design[name], highest, ends, Table(design), value)
+                    if solve_again(fixed_problem, limited_options, problem, is_thorough=True):
+                        need = RequiredValue(name, design[name], is_maximum, ends, Table(design), value)
                         return replace(solution, need=need)
             return solution
-        if time.perf_counter() - began > _SECONDS:
+        if time.perf_counter() - began > _MAX_SECONDS:
             break
     if searched_ends:
         solution = replace(
@@ -88,7 +89,7 @@ def _find_speed(problem: Posed) -> str:
 
 
 def _list_ranges(problem: Posed, name: str) -> Iterator[tuple[bool, tuple[float, float]]]:
-    """Yield (whether to maximise the speed, range): first the range above the allowed speeds, then that below them."""
+    """Yield (whether to maximise the speed, range): first with the range above the allowed speeds, then below."""
     low, high = problem.free.get(name, (problem.fixed.get(name, math.nan),) * 2)
     middle = {**problem.fixed, **{n: sum(ends) / 2 for n, ends in problem.free.items()}}
     unit = math.sqrt(middle["g"] * middle["w"]) if {"g", "w"} <= middle.keys() else 1.0
