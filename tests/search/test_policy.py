@@ -112,7 +112,7 @@ def settled(ends, share=0.5, far_off=False, left=0):
     failed = make_failed_end(Start({}), nlp)
     ended = tuple(failed if e is None else replace(failed, objective=e, feasible=True) for e in ends)
     refined = sampling.DesignBatch(np.zeros((left, 1)), np.zeros(left), np.zeros(left))
-    box = SimpleNamespace(is_narrow=share < tmsopt.TUNING.narrow)
+    box = SimpleNamespace(is_narrow=share < tmsopt.TUNING.narrow_share)
     sample = SimpleNamespace(box=box, is_far_off=far_off, refined=refined, leaders=refined)
     return bool(POLICY.enough(SearchState(PLAIN, PLAIN, nlp, sample=sample, ends=ended)))
 
@@ -294,8 +294,8 @@ def test_rescues_are_left_out_by_name():
     for name in names:
         assert [rescue.name for rescue in POLICY.without(name).rescues] == [n for n in names if n != name]
         assert POLICY.without(name).tuning == POLICY.tuning
-    with pytest.raises(InputError, match="no rescue is called 'asid'; did you mean 'aside'"):
-        POLICY.without("asid")
+    with pytest.raises(InputError, match="no rescue is called 'small ste'; did you mean 'small step'"):
+        POLICY.without("small ste")
 
 
 def test_a_rescue_of_ones_own_steps_in_after_the_loop():
@@ -362,19 +362,19 @@ def tuned(asked=None, **numbers):
 
 
 def test_a_tuning_of_ones_own_is_used():
-    assert 600 <= tuned(most=600, least=600, first=600).starts.looked < 610
+    assert 600 <= tuned(max_sample=600, min_sample=600, base_sample=600).starts.looked < 610
     assert tuned().starts.looked > 1500
 
 
 def test_tolerances_of_ones_own_are_obeyed():
     """Nothing converges where the gradient and what rows are off by are to be negative."""
-    assert tuned(exact=-1.0, polished=-1.0, stationary=-1.0).status == "not_converged"
+    assert tuned(polished_violation=-1.0, polished_gradient=-1.0, stationary_gradient=-1.0).status == "not_converged"
 
 
 def test_climbs_for_the_radius_are_tuned_too():
     asked = wells(model=from_coefficients([1, 1, x]), minimize=None, maximize="radius", free={"x": (0.5, 2.0)})
-    assert tuned(asked, climbs=1, fewest_climbs=1).starts.runs == 1
+    assert tuned(asked, max_climbs=1, min_climbs=1).starts.runs == 1
 
 
 def test_an_odd_number_of_designs_may_be_looked_at_about_each():
-    assert tuned(local=41, basin_local=25).value == pytest.approx(depth(LEFT), abs=1e-8)
+    assert tuned(neighbour_count=41, basin_neighbour_count=25).value == pytest.approx(depth(LEFT), abs=1e-8)

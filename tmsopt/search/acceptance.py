@@ -19,10 +19,12 @@ def accept_best(state: SearchState) -> SearchState:
     """Add the best end to the state: the first that passes the recheck after polishing, or else the least violating."""
     best, tried_objectives = state.best, list[float]()
     for end in sorted((e for e in state.ends[state.accepted :] if e.feasible), key=lambda end: end.objective):
-        equal_count = sum(same_objective(end.objective, x, end.nlp.size, state.tuning.same) for x in tried_objectives)
+        equal_count = sum(
+            same_objective(end.objective, x, end.nlp.size, state.tuning.same_objective) for x in tried_objectives
+        )
         if best and is_sound(state.problem, best) and not equal_count and best.end.objective <= end.objective:
             break
-        if equal_count >= state.tuning.alike:
+        if equal_count >= state.tuning.equal_ends:
             continue
         tried_objectives.append(end.objective)
         trial = check_end(state, end)
@@ -53,20 +55,26 @@ def is_sound(problem: Posed, trial: CheckedEnd) -> bool:
 
 def is_stationary(trial: CheckedEnd) -> bool:
     """Whether the gradient of the Lagrangian vanishes, even if IPOPT reports a failure."""
-    return trial.point.stationarity <= trial.tuning.stationary
+    return trial.point.stationarity <= trial.tuning.stationary_gradient
 
 
 def has_converged(trial: CheckedEnd) -> bool:
     """Whether the solver's status or the gradient shows an optimum, and the rows of the program hold there."""
     tuning, is_optimal = trial.tuning, trial.end.run.status in _CONVERGED_STATUSES or is_stationary(trial)
-    return is_optimal and (trial.point.violation <= tuning.exact or trial.point.stationarity <= tuning.polished)
+    return is_optimal and (
+        trial.point.violation <= tuning.polished_violation or trial.point.stationarity <= tuning.polished_gradient
+    )
 
 
 def has_matching_claim(problem: Posed, trial: CheckedEnd) -> bool:
     """Whether the objective that the solver claims equals that of the recheck."""
     if problem.objective is None:
         return True
-    claim, objective, tolerance = problem.sign * trial.point.objective, trial.checked.objective, trial.tuning.claimed
+    claim, objective, tolerance = (
+        problem.sign * trial.point.objective,
+        trial.checked.objective,
+        trial.tuning.claim_tolerance,
+    )
     return math.isclose(claim, objective, rel_tol=tolerance, abs_tol=tolerance)
 
 
@@ -79,13 +87,13 @@ def is_better(problem: Posed, candidate: CheckedEnd, other: CheckedEnd) -> bool:
 
     def rank(trial: CheckedEnd) -> tuple[float, bool, float]:
         claim, value = trial.point.objective, problem.sign * trial.checked.objective
-        penalty = 0.0 if has_matching_claim(problem, trial) else trial.tuning.doubt * abs(claim - value)
+        penalty = 0.0 if has_matching_claim(problem, trial) else trial.tuning.claim_weight * abs(claim - value)
         objective = claim if math.isnan(value) else value + penalty
         return sum(trial.checked.violations.values()), _has_unreached_root(trial), objective
 
     (*keys, objective), (*other_keys, other_objective) = rank(candidate), rank(other)
     if keys == other_keys and same_objective(
-        objective, other_objective, candidate.end.nlp.size, candidate.tuning.finer
+        objective, other_objective, candidate.end.nlp.size, candidate.tuning.polished_difference
     ):
         return has_converged(candidate) and not has_converged(other)
     return (*keys, objective) < (*other_keys, other_objective)
@@ -93,5 +101,5 @@ def is_better(problem: Posed, candidate: CheckedEnd, other: CheckedEnd) -> bool:
 
 def _has_unreached_root(trial: CheckedEnd) -> bool:
     """Whether a trial that has not converged has the objective of a multiple root that it only comes close to."""
-    ideal, stored, tolerance = trial.checked.structure.abscissa, trial.checked.realised, trial.tuning.claimed
+    ideal, stored, tolerance = trial.checked.structure.abscissa, trial.checked.realised, trial.tuning.claim_tolerance
     return not has_converged(trial) and not math.isclose(ideal, stored, rel_tol=tolerance, abs_tol=tolerance)

@@ -27,7 +27,7 @@ def solve_from(state: SearchState, start: Start) -> LocalEnd:
         if has_converged or is_last or not np.all(np.isfinite(best.run.x)):
             break
         end = run_once(state, replace(start, design=state.design_at(best)), "far" if restart % 2 else "near")
-        if best.feasible and (not end.feasible or end.objective >= best.objective - tuning.same):
+        if best.feasible and (not end.feasible or end.objective >= best.objective - tuning.same_objective):
             break
         best = end
     return _add_led_designs(state, keep_to_start(state, start, exchange_contacts(state, best)))
@@ -37,7 +37,7 @@ def count_restarts(state: SearchState) -> int:
     """Return how often to restart from an end that violates limits: more often if feasible ends are likely."""
     if state.feasible:
         return state.tuning.restarts if state.sample is None else 1
-    has_failed_blind = state.sample is None and len(state.ends) >= state.tuning.blind
+    has_failed_blind = state.sample is None and len(state.ends) >= state.tuning.repeated_blind_starts
     return 0 if has_failed_blind or (state.nlp.formulation != "elastic" and state.out_of_reach) else 1
 
 
@@ -47,7 +47,7 @@ def run_once(state: SearchState, start: Start, settings: str) -> LocalEnd:
     The variants differ in which root determines each root quantity, and on which side of each kink the program stays.
     """
     x = initial_point(state.nlp, state.part, start.design, settings == "near")
-    variants = islice(state.nlp.impose_contacts(x), state.tuning.ways)
+    variants = islice(state.nlp.impose_contacts(x), state.tuning.max_variants)
     return min((_run_ipopt(state, start, x, variant, settings) for variant in variants), key=lambda end: end.rank)
 
 
@@ -57,7 +57,7 @@ def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
         return best
     box = state.sample.box
     start_batch = box.judge_points(box.space.points(start.design)[None])
-    if start_batch.violation[0] > 0 or start_batch.objective[0] >= best.objective - state.tuning.same:
+    if start_batch.violation[0] > 0 or start_batch.objective[0] >= best.objective - state.tuning.same_objective:
         return best
     second_end = run_once(state, start, "far" if start.near else "near")
     return second_end if second_end.feasible and second_end.objective < best.objective else best
@@ -65,12 +65,14 @@ def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
 
 def exchange_contacts(state: SearchState, best: LocalEnd) -> LocalEnd:
     """Run IPOPT on other variants (see `run_once`) that fit the end as well as its own; return the best end."""
-    for _ in range(state.tuning.exchanges if state.nlp.contacts and best.feasible else 0):
+    for _ in range(state.tuning.variant_exchanges if state.nlp.contacts and best.feasible else 0):
         x = best.run.x
-        others = (variant for variant in state.nlp.impose_contacts(x, state.tuning.meets) if variant != best.nlp)
-        ends = [_run_ipopt(state, best.start, x, nlp, "near") for nlp in islice(others, 2 * state.tuning.ways)]
+        others = (
+            variant for variant in state.nlp.impose_contacts(x, state.tuning.variant_tolerance) if variant != best.nlp
+        )
+        ends = [_run_ipopt(state, best.start, x, nlp, "near") for nlp in islice(others, 2 * state.tuning.max_variants)]
         best_exchange = min(ends, key=lambda end: end.rank, default=best)
-        if not (best_exchange.feasible and best_exchange.objective < best.objective - state.tuning.same):
+        if not (best_exchange.feasible and best_exchange.objective < best.objective - state.tuning.same_objective):
             break
         best = best_exchange
     return best
@@ -86,7 +88,10 @@ def _run_ipopt(state: SearchState, start: Start, x: Array, variant: NLP, setting
     excesses = np.maximum(np.array(variant.row_lower) - rows, rows - np.array(variant.row_upper)).clip(0)
     # Rows constrain the squared distance of two roots: if a row holds to 1e-12, the distance may be 1e-6.
     rounding_gain = 2 * float(np.abs(np.nan_to_num(run.row_multipliers)) @ excesses) if variant.contacts else 0.0
-    end, is_feasible = replace(end, objective=f + rounding_gain), excesses.max(initial=0.0) <= state.tuning.feasible
+    end, is_feasible = (
+        replace(end, objective=f + rounding_gain),
+        excesses.max(initial=0.0) <= state.tuning.feasible_violation,
+    )
     if not is_feasible or run.status == "Infeasible_Problem_Detected" or _is_spurious(state, end):
         return end
     part, pattern = state.part, state.part.pattern
@@ -108,7 +113,7 @@ def _is_spurious(state: SearchState, end: LocalEnd) -> bool:
     z = roots(a)
     abscissa = end.run.x[nlp.variables.index("abscissa")] * nlp.unit
     size = np.maximum(np.abs(z).max(axis=1), nlp.unit)  # not 0, even if all roots are 0
-    scatter = max(state.tuning.scatter, state.tuning.residual ** (1 / state.part.model.degree))
+    scatter = max(state.tuning.root_scatter, state.tuning.max_residual ** (1 / state.part.model.degree))
     return bool(np.any(abscissa < z.real.max(axis=1) - scatter * size))
 
 
@@ -119,10 +124,13 @@ def _add_led_designs(state: SearchState, end: LocalEnd) -> LocalEnd:
     tuning, leaders, box = state.tuning, state.sample.leaders, state.sample.box
     end_point = box.space.points(state.design_at(end))
     known_points = (box.space.points(state.design_at(other)) for other in state.feasible)
-    if is_proven(state, end) or any(np.abs(end_point - other).max() <= tuning.same for other in known_points):
+    if is_proven(state, end) or any(np.abs(end_point - other).max() <= tuning.same_objective for other in known_points):
         return end  # the search ends here, or an earlier end has the same design
     rows = [row for row in state.left if row != end.start.row]
-    batch, tolerance = leaders.take(np.array(rows, dtype=int)), tuning.same * (end.nlp.size + abs(end.objective))
+    batch, tolerance = (
+        leaders.take(np.array(rows, dtype=int)),
+        tuning.same_objective * (end.nlp.size + abs(end.objective)),
+    )
     if not rows:
         return end
     fractions = np.arange(1, 8)[:, None] / 8
@@ -131,7 +139,7 @@ def _add_led_designs(state: SearchState, end: LocalEnd) -> LocalEnd:
     gain = batch.objective - end.objective
     objectives = np.concatenate([batch.objective[:, None], objective], axis=1)
     is_falling = np.all(
-        objectives[:, 1:] <= objectives[:, :-1] + (tuning.level * np.abs(gain) + tolerance)[:, None], axis=1
+        objectives[:, 1:] <= objectives[:, :-1] + (tuning.path_rise * np.abs(gain) + tolerance)[:, None], axis=1
     )
     is_downhill = (
         is_falling & (gain >= -tolerance) & np.isfinite(batch.objective) & (violation.max(axis=1) <= batch.violation)

@@ -74,7 +74,7 @@ def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None
     parameters, nlp = trial.parameters, trial.end.nlp
     checked = trial.checked if cases is None else recheck(problem, parameters, cases)
     freedom, is_violated = degrees_of_freedom(problem), bool(checked.violations)
-    if sum(checked.violations.values()) > state.tuning.spurious and freedom.count >= 0:
+    if sum(checked.violations.values()) > state.tuning.rounding_violation and freedom.count >= 0:
         return None
     notes, status = _find_doubts(problem, trial, checked), "not_converged"
     if not (notes or is_violated):
@@ -150,7 +150,12 @@ def _is_better(problem: Posed, candidate: Outcome, other: Outcome, tuning: Tunin
     """Whether an outcome is better than another: by feasibility, by the objective, then by the status ``optimal``."""
     a, b = (problem.sign * outcome.checked.objective for outcome in (candidate, other))
     has_no_violations = not (candidate.checked.violations or other.checked.violations)
-    if has_no_violations and math.isfinite(a) and math.isfinite(b) and not math.isclose(a, b, rel_tol=tuning.claimed):
+    if (
+        has_no_violations
+        and math.isfinite(a)
+        and math.isfinite(b)
+        and not math.isclose(a, b, rel_tol=tuning.claim_tolerance)
+    ):
         return a < b
 
     def rank(outcome: Outcome, value: float) -> tuple[bool, bool, float]:
@@ -242,11 +247,11 @@ def demote_if_unbounded(state: SearchState, outcome: Outcome) -> Outcome:
     problem, value = state.problem, state.problem.sign * outcome.checked.objective
     if problem.objective is None or outcome.checked.violations:
         return outcome
-    if state.sample and math.isfinite(value) and value < -state.tuning.endless * state.sample.spread < 0:
+    if state.sample and math.isfinite(value) and value < -state.tuning.unbounded_spreads * state.sample.spread < 0:
         if outcome.status == "optimal":
             return outcome
         return replace(outcome, has_no_best_design=True, notes=(UNBOUNDED,))
-    has_runaway = has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway)
+    has_runaway = has_runaway_root(outcome.checked.structure.roots, state.tuning.infinite_root_size)
     if outcome.status != "optimal" or not has_runaway or _is_a0_limited(problem, outcome):
         return outcome
     note = (
@@ -261,10 +266,12 @@ def demote_if_beaten(state: SearchState, outcome: Outcome) -> Outcome:
     if outcome.status != "optimal" or state.sample is None or problem.objective is None:
         return outcome
     box, objective = state.sample.box, problem.sign * outcome.checked.objective
-    threshold = objective - tuning.lost * (state.nlp.size + abs(objective))
+    threshold = objective - tuning.better_by * (state.nlp.size + abs(objective))
     points = np.array([box.space.points(design) for design in state.designs]).reshape(-1, box.space.size)
-    is_distinct = np.abs(points - box.space.points(outcome.parameters)).max(axis=1, initial=0.0) > tuning.same_design
-    rivals = box.judge_points(points[is_distinct]).select_better(threshold).take_best(tuning.rivals_seen)
+    is_distinct = (
+        np.abs(points - box.space.points(outcome.parameters)).max(axis=1, initial=0.0) > tuning.same_design_distance
+    )
+    rivals = box.judge_points(points[is_distinct]).select_better(threshold).take_best(tuning.rival_starts)
     for design in box.designs(rivals):
         rival = assess_design(problem, design, BETTER_END)
         checked = rival.checked

@@ -50,7 +50,7 @@ def climb(state: SearchState, start: Start) -> LocalEnd:
         if trial.checked.violations:
             break
         claimed_radius, margins = float(trial.point.x[nlp.variables.index(RADIUS)]), trial.checked.robustness
-        if margins is not None and margins.radius >= claimed_radius * (1 - state.tuning.exact_radius):
+        if margins is not None and margins.radius >= claimed_radius * (1 - state.tuning.radius_accuracy):
             return end
         design = trial.parameters
         points = [_move_point(case, k, trial) for k, case in enumerate(nlp.cases, start=1) if case.edge]
@@ -68,23 +68,23 @@ def propose_climbs(state: SearchState) -> Iterator[Start]:
     if problem.start or state.options.near:
         yield Start(state.options.near or {})
     box = draw_box(abscissa_problem, state.options.seed, tuning)
-    batch = box.draws.take_best(2 * tuning.estimated)
-    if np.sum(batch.violation == 0) < tuning.estimated // 4:
-        batch = batch.join(box.approach_limits(batch.take_first(tuning.estimated // 2)))
+    batch = box.draws.take_best(2 * tuning.radius_estimates)
+    if np.sum(batch.violation == 0) < tuning.radius_estimates // 4:
+        batch = batch.join(box.approach_limits(batch.take_first(tuning.radius_estimates // 2)))
         batch = batch.take(batch.order)
-    batch = batch.take(np.flatnonzero(batch.objective < 0)[: tuning.estimated])
+    batch = batch.take(np.flatnonzero(batch.objective < 0)[: tuning.radius_estimates])
     if not len(batch):
         return
     radii = estimate_radii(problem, box.space.designs(batch.u), state.options.seed)
     ranked = batch.take(np.lexsort((-radii, batch.violation)))
-    yield from (Start(design) for design in box.designs(ranked.select_apart(tuning.climbs, tuning.apart)))
+    yield from (Start(design) for design in box.designs(ranked.select_apart(tuning.max_climbs, tuning.basin_distance)))
 
 
 def has_enough_climbs(state: SearchState) -> bool:
     """Whether enough climbs succeeded, and at least two of them ended at the best radius."""
     feasible = state.feasible
     best = min((end.objective for end in feasible), default=np.inf)
-    return len(feasible) >= state.tuning.fewest_climbs and count_starts(feasible, best).at_best >= 2
+    return len(feasible) >= state.tuning.min_climbs and count_starts(feasible, best).at_best >= 2
 
 
 RADIUS_POLICY = Policy(lambda _: None, propose_climbs, climb, accept_best, has_enough_climbs)
@@ -102,8 +102,8 @@ def _add_boundary_points(problem: Posed, points: list[Case], margins: Robustness
         # The direction has all parameters that the radius varies, also those that are 0 in the design.
         direction = Table({n: nearest.direction.get(n, 0.0) for n in _list_varied_parameters(problem)})
         case = Case(direction=direction, edge=nearest.kind)
-        is_near = nearest.distance <= tuning.beyond * margins.radius
-        if is_near and not any(_is_alike(case, other, tuning.alike_points) for other in points):
+        is_near = nearest.distance <= tuning.max_boundary_distance * margins.radius
+        if is_near and not any(_is_alike(case, other, tuning.equal_point_distance) for other in points):
             cases.append(case)
     return cases
 

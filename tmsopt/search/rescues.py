@@ -33,7 +33,7 @@ def search_real_roots(state: SearchState, policy: Policy) -> SearchState:
         return search_again(
             search_again(state, disable_stopping(policy), starts), disable_stopping(policy), starts, nlp
         )
-    return search_again(state, policy, nlp=nlp, max_starts=state.tuning.fewer)
+    return search_again(state, policy, nlp=nlp, max_starts=state.tuning.second_program_starts)
 
 
 def find_multiple_roots(state: SearchState, policy: Policy) -> list[Start]:
@@ -44,7 +44,9 @@ def find_multiple_roots(state: SearchState, policy: Policy) -> list[Start]:
     short_policy = replace(
         policy,
         local=lambda pattern_state, start: run_once(pattern_state, start, "far"),
-        enough=lambda pattern_state: len(pattern_state.ends) >= tuning.leadless or bool(pattern_state.feasible),
+        enough=lambda pattern_state: (
+            len(pattern_state.ends) >= tuning.starts_without_lead or bool(pattern_state.feasible)
+        ),
     )
     for pattern in full_patterns(part.model) if state.sample and not state.options.near else ():
         pattern_problem = part.derive(locate=pattern, **changes)
@@ -53,7 +55,9 @@ def find_multiple_roots(state: SearchState, policy: Policy) -> list[Start]:
                 state.with_program(formulate_matching(pattern_problem)), problem=pattern_problem, part=pattern_problem
             )
             pattern_state = try_starts(pattern_state, propose_sample_starts(state.sample), short_policy)
-            starts += [Start(state.design_at(end)) for end in select_distinct_ends(pattern_state.ends)[: tuning.leads]]
+            starts += [
+                Start(state.design_at(end)) for end in select_distinct_ends(pattern_state.ends)[: tuning.lead_starts]
+            ]
     return starts
 
 
@@ -77,7 +81,7 @@ def search_positive_roots(state: SearchState, policy: Policy) -> SearchState:
         "maximize",
         "damping_ratio",
     )
-    return search_again(state, policy, nlp=nlp, max_starts=state.tuning.fewer if has_few_starts else 0)
+    return search_again(state, policy, nlp=nlp, max_starts=state.tuning.second_program_starts if has_few_starts else 0)
 
 
 def has_only_crossings(state: SearchState) -> bool:
@@ -89,7 +93,7 @@ def has_only_crossings(state: SearchState) -> bool:
 def search_other_chains(state: SearchState, policy: Policy) -> SearchState:
     """Search for exceptional points from other starts, because the points found first are only crossings."""
     part = state.part
-    for design in choose_starts(part, state.options.seed, state.tuning.chains):
+    for design in choose_starts(part, state.options.seed, state.tuning.chain_starts):
         nlp = formulate_matching(part.derive(minimize=None, maximize=None, start=design))
         state = search_again(state, policy, [Start(design)], nlp)
         if state.best and is_sound(state.problem, state.best):
@@ -112,7 +116,7 @@ def find_rivals(state: SearchState) -> DesignBatch | None:
 
 def compute_threshold(state: SearchState, tolerance: float | None = None) -> float:
     """Return the objective below which a design is better than the best end; inf without a feasible best end."""
-    best, tolerance = state.best, state.tuning.lost if tolerance is None else tolerance
+    best, tolerance = state.best, state.tuning.better_by if tolerance is None else tolerance
     if best is None or best.checked.violations:
         return math.inf
     objective = state.problem.sign * best.checked.objective
@@ -126,7 +130,7 @@ def restart_from_rivals(state: SearchState, policy: Policy) -> SearchState:
         if not rivals or not state.sample:
             break
         previous_best = state.best
-        starts = (Start(design) for design in state.sample.box.designs(rivals.take_best(state.tuning.rivals_seen)))
+        starts = (Start(design) for design in state.sample.box.designs(rivals.take_best(state.tuning.rival_starts)))
         state = search_again(state, disable_stopping(policy), starts)
         if state.best is previous_best:
             break
@@ -140,15 +144,15 @@ def has_doubtful_claim(state: SearchState) -> bool:
         return False
     if best is not None and goal is not None and "damping_ratio" in goal.names:
         sizes = sorted(root.size for root in best.checked.structure.roots)
-        if sizes and sizes[0] < state.tuning.zero_root * sizes[-1]:
+        if sizes and sizes[0] < state.tuning.zero_root_size * sizes[-1]:
             return True
     return any(end.objective < threshold for end in state.feasible)
 
 
 def move_aside(state: SearchState, policy: Policy) -> SearchState:
     """Replace the best end by a design close to an end, if that design has the objective claimed for this end."""
-    problem, tolerance = state.problem, state.tuning.lost
-    for end in select_distinct_ends(state.ends)[: state.tuning.asides]:
+    problem, tolerance = state.problem, state.tuning.better_by
+    for end in select_distinct_ends(state.ends)[: state.tuning.aside_optima]:
         checked_end = check_end(state, end)
         for design in (checked_end.parameters, *_propose_near_designs(state, checked_end.parameters, end.objective)):
             checked = state.recheck(design)
@@ -169,14 +173,16 @@ def _propose_near_designs(
     assert state.sample is not None
     box, tuning = state.sample.box, state.tuning
     point = box.space.points(design)
-    random = stream(box.seed, "aside").random((tuning.towards, len(point)))
-    targets = np.concatenate([state.sample.refined.u[: tuning.rivals_seen], random])
-    points = point + np.array(tuning.hairs)[:, None, None] * (targets - point)
+    random = stream(box.seed, "aside").random((tuning.aside_targets, len(point)))
+    targets = np.concatenate([state.sample.refined.u[: tuning.rival_starts], random])
+    points = point + np.array(tuning.aside_steps)[:, None, None] * (targets - point)
     batch = box.judge_points(points.reshape(-1, len(point)))
-    is_close = (batch.violation == 0) & (np.abs(batch.objective - objective) <= tuning.edge * (1 + abs(objective)))
+    is_close = (batch.violation == 0) & (
+        np.abs(batch.objective - objective) <= tuning.aside_accuracy * (1 + abs(objective))
+    )
     # The rows go from large moves to small ones: a large move may worsen the design, a tiny one is lost in rounding.
     rows = np.flatnonzero(is_close)
-    return box.designs(batch.take(rows[:: max(len(rows) // tuning.kept, 1)]))
+    return box.designs(batch.take(rows[:: max(len(rows) // tuning.rechecked_designs, 1)]))
 
 
 def keep_rival(state: SearchState, policy: Policy) -> SearchState:
@@ -185,8 +191,8 @@ def keep_rival(state: SearchState, policy: Policy) -> SearchState:
     if not rivals or not state.sample:
         return state
     box = state.sample.box
-    fine_batch = box.refine(rivals.take_first(1), state.tuning.finest).join(rivals)
-    for design in box.designs(fine_batch.take_first(state.tuning.kept)):
+    fine_batch = box.refine(rivals.take_first(1), state.tuning.polish_steps).join(rivals)
+    for design in box.designs(fine_batch.take_first(state.tuning.rechecked_designs)):
         checked = state.recheck(design)
         if not checked.violations and state.problem.sign * checked.objective < compute_threshold(state):
             return replace(state, fallback=Fallback(design, BEST_SAMPLED))
@@ -209,7 +215,7 @@ def can_approach_infinity(state: SearchState) -> bool:
     return (
         has_failed_start
         or best is None
-        or has_runaway_root(best.checked.structure.roots, state.tuning.far_root)
+        or has_runaway_root(best.checked.structure.roots, state.tuning.far_root_size)
         or bool(find_singular_rivals(state))
     )
 
@@ -235,28 +241,32 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
     tuning, box, best = state.tuning, state.sample.box, state.best
     rivals = (find_rivals(state) or state.sample.refined).join(find_singular_rivals(state))
     rows = np.arange(len(rivals))
-    chosen_rows = np.union1d(rows[: tuning.open], rows[-tuning.open :])
+    chosen_rows = np.union1d(rows[: tuning.singular_starts], rows[-tuning.singular_starts :])
     starts = [Start(design) for design in box.designs(rivals.take(chosen_rows))]
     starts += [Start(best.parameters)] if best else []
-    starts += [Start(design, near=False) for design in box.designs(state.sample.boldest.take_first(tuning.open))]
-    is_at_zero = best is not None and abs(compute_relative_a0(state, best.parameters)) < tuning.singular
-    threshold = compute_threshold(state, -tuning.lost if is_at_zero else tuning.finer)
+    starts += [
+        Start(design, near=False) for design in box.designs(state.sample.boldest.take_first(tuning.singular_starts))
+    ]
+    is_at_zero = best is not None and abs(compute_relative_a0(state, best.parameters)) < tuning.zero_a0
+    threshold = compute_threshold(state, -tuning.better_by if is_at_zero else tuning.polished_difference)
     for sign in (1, -1):
-        side_starts = [s for s in starts if sign * compute_relative_a0(state, s.design) > -tuning.singular]
+        side_starts = [s for s in starts if sign * compute_relative_a0(state, s.design) > -tuning.zero_a0]
         nlp = formulate(state.part, state.nlp.cases, lead=sign)
         side_state = try_starts(state.with_program(nlp), side_starts, disable_stopping(policy))
         best_end = min(side_state.feasible, key=lambda end: end.objective, default=None)
         if best_end is None or not best_end.objective < threshold:
             continue
         is_a0_row = np.array(nlp.rows) == "a0"
-        is_singular = bool(nlp.evaluate(best_end.run.x)[1][is_a0_row].min() < tuning.singular)
+        is_singular = bool(nlp.evaluate(best_end.run.x)[1][is_a0_row].min() < tuning.zero_a0)
         if is_singular:
-            lower = np.where(is_a0_row, tuning.inside, nlp.row_lower)
+            lower = np.where(is_a0_row, tuning.infimum_a0, nlp.row_lower)
             side_state = state.with_program(replace(nlp, row_lower=tuple(lower.tolist())))
             side_state = try_starts(side_state, [Start(state.design_at(best_end))], disable_stopping(policy))
         side_state = policy.accept(side_state)
         if side_state.best is None or side_state.best.checked.violations or has_merged_roots(side_state.best):
-            is_near_infinity = best and is_singular and has_runaway_root(best.checked.structure.roots, tuning.far_root)
+            is_near_infinity = (
+                best and is_singular and has_runaway_root(best.checked.structure.roots, tuning.far_root_size)
+            )
             if best and is_near_infinity and best_end.objective < compute_threshold(state):
                 advice = write_mass_advice(state.problem)
                 words = f"a better design may be close to a singular mass matrix (a0 = 0); {advice}"
@@ -264,7 +274,7 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
             continue
         if not state.problem.sign * side_state.best.checked.objective < threshold:
             continue
-        ends, threshold = (*state.ends, *side_state.ends), compute_threshold(side_state, tuning.finer)
+        ends, threshold = (*state.ends, *side_state.ends), compute_threshold(side_state, tuning.polished_difference)
         state = replace(side_state, ends=ends, accepted=len(ends), fallback=None)
         if is_singular:
             goal = f"towards a singular mass matrix (a0 = 0), to {state.problem.sign * best_end.objective:.9g}"
@@ -282,7 +292,7 @@ def compute_relative_a0(state: SearchState, design: Mapping[str, float]) -> floa
 def has_merged_roots(trial: CheckedEnd) -> bool:
     """Whether distant roots count as one, because rounding errors near a0 = 0 dominate the coefficients."""
     ideal, stored = trial.checked.structure.abscissa, trial.checked.realised
-    return abs(ideal - stored) > trial.tuning.merged * abs(ideal)
+    return abs(ideal - stored) > trial.tuning.distinct_root_difference * abs(ideal)
 
 
 RESCUES = (
@@ -291,7 +301,7 @@ RESCUES = (
     Rescue("real roots", "hard 3", lambda s: {"abscissa", "damping_ratio"} <= {*s.nlp.variables}, search_real_roots),
     Rescue("positive roots", "hard 7, systems 1, variety 4", can_have_positive_roots, search_positive_roots),
     Rescue("appeals", "sixfold 14", lambda s: bool(find_rivals(s)), restart_from_rivals),
-    Rescue("aside", "narrow 14, hard 4, variety 1", has_doubtful_claim, move_aside),
+    Rescue("small step", "narrow 14, hard 4, variety 1", has_doubtful_claim, move_aside),
     Rescue("infinity", "hard 9", can_approach_infinity, search_singular),
     Rescue("kept design", "", lambda s: bool(find_rivals(s)) and s.fallback is None, keep_rival),
 )

@@ -128,7 +128,7 @@ class Box:
     @property
     def is_narrow(self) -> bool:
         """Whether few designs meet all limits."""
-        return bool(np.mean(self.draws.violation == 0) < self.tuning.narrow)
+        return bool(np.mean(self.draws.violation == 0) < self.tuning.narrow_share)
 
     def refine(
         self, start: DesignBatch, step_sizes: Sequence[float | Array] = (), neighbour_count: int = 0
@@ -143,11 +143,11 @@ class Box:
         batch, rng, count, size = (
             start,
             stream(self.seed, "refine"),
-            neighbour_count or self.tuning.local,
+            neighbour_count or self.tuning.neighbour_count,
             self.space.size,
         )
         rows = np.arange(len(start))
-        for step_size in (step_sizes or self.tuning.reaches) if rows.size else ():
+        for step_size in (step_sizes or self.tuning.step_sizes) if rows.size else ():
             steps = rng.standard_normal((rows.size, count, size))
             steps[:, ::2] *= rng.random(steps[:, ::2].shape) < 0.5  # every second step changes some parameters only
             neighbours = self.judge_points(np.clip(batch.u[:, None] + step_size * steps, 0.0, 1.0).reshape(-1, size))
@@ -162,10 +162,10 @@ class Box:
         for step in range(self.tuning.newton_steps):
             rows = np.flatnonzero((batch.violation > 0) & is_moving)
             if not rows.size or (
-                step == self.tuning.hopeless_steps and batch.all_violate_by(self.unreachable_violation)
+                step == self.tuning.hopeless_newton_steps and batch.all_violate_by(self.unreachable_violation)
             ):
                 break
-            u, fractions = batch.u[rows], np.array(self.tuning.shares)
+            u, fractions = batch.u[rows], np.array(self.tuning.step_shares)
             trial_points = np.clip(u[:, None] + self._newton_steps(u)[:, None] * fractions[:, None], 0.0, 1.0)
             trials = self.judge_points(trial_points.reshape(-1, self.space.size))
             best = np.argmin(trials.violation.reshape(len(rows), -1), axis=1) + np.arange(len(rows)) * len(fractions)
@@ -179,32 +179,36 @@ class Box:
         """Find the best designs around a design: at many distances, and with one parameter at an end of its range."""
         tuning, size = self.tuning, self.space.size
         u, rng = self.space.points(design), stream(self.seed, "around")
-        distances = np.repeat(np.geomspace(0.5, 1e-5, tuning.shells), tuning.shell)[:, None]
+        distances = np.repeat(np.geomspace(0.5, 1e-5, tuning.shell_distances), tuning.shell_designs)[:, None]
         steps = rng.standard_normal((len(distances), size))
         steps[::2] *= rng.random(steps[::2].shape) < 0.5
         ends = np.repeat(u[None], 2 * size, axis=0)
         ends[np.arange(len(ends)), np.arange(len(ends)) // 2] = np.tile([0.0, 1.0], size)
         batch = self.judge_points(np.clip(np.concatenate([u[None], u + distances * steps, ends]), 0.0, 1.0))
-        return batch.take_best(tuning.ranked).select_apart(tuning.leaders, tuning.beside)
+        return batch.take_best(tuning.ranked_designs).select_apart(tuning.leaders, tuning.near_best_distance)
 
     def ignore_limit(self, limit: str) -> DesignBatch:
         """Find designs far apart that violate the other limits least; their violations do not include this limit."""
         is_ignored = [name == limit for name in self.problem.conditions]
         box = replace(self, scales=np.where(is_ignored, 1e300, self.scales))
         draws = _make_batch(self.draws.u, self.draw_scores, box.scales, self.tuning)
-        leaders = draws.take_best(self.tuning.ranked).select_apart(self.tuning.leaders, self.tuning.apart)
+        leaders = draws.take_best(self.tuning.ranked_designs).select_apart(
+            self.tuning.leaders, self.tuning.basin_distance
+        )
         batch = box.refine(box.approach_limits(leaders))
         return batch.take(batch.order)
 
     @property
     def unreachable_violation(self) -> float:
         """Largest violation near an n-fold root: a sample misses the root by the n-th root of its last step size."""
-        return self.tuning.unreachable * float(self.tuning.reaches[-1] ** (1 / max(self.problem.model.degree, 4)))
+        return self.tuning.unreachable_distance * float(
+            self.tuning.step_sizes[-1] ** (1 / max(self.problem.model.degree, 4))
+        )
 
     def _newton_steps(self, u: Array) -> Array:
         """Return the shortest steps that meet the violated limits to first order."""
         size = self.space.size
-        steps = np.where(u < 0.5, self.tuning.difference, -self.tuning.difference)
+        steps = np.where(u < 0.5, self.tuning.difference_step, -self.tuning.difference_step)
         points = u[:, None] + np.concatenate([np.zeros((1, size)), np.eye(size)])[None] * steps[:, None]
         scores = score_designs(self.problem, self.space.designs(points.reshape(-1, size)))
         excess = scores.beyond.reshape(len(scores.beyond), len(u), size + 1) / self.scales[:, None, None]
@@ -248,7 +252,7 @@ class Sample:
     @property
     def is_far_off(self) -> bool:
         """Whether no refined design comes near to meeting the limits, so that they seem to exclude each other."""
-        return self.refined.all_violate_by(self.box.tuning.far_off)
+        return self.refined.all_violate_by(self.box.tuning.far_excess)
 
     @property
     def out_of_reach(self) -> bool:
@@ -275,43 +279,51 @@ def draw_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Box:
 def sample_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Sample:
     """Draw a sample and refine its best designs."""
     box = draw_box(problem, seed, tuning)
-    draws, ranked = box.draws, box.draws.take_best(tuning.ranked)
+    draws, ranked = box.draws, box.draws.take_best(tuning.ranked_designs)
     if box.is_narrow:
-        approached = box.approach_limits(ranked.select_scattered(tuning.sought, tuning.cell))
-        refined = box.refine(approached.take(approached.order).select_apart(2 * tuning.leaders, tuning.apart))
+        approached = box.approach_limits(ranked.select_scattered(tuning.newton_designs, tuning.cell_size))
+        refined = box.refine(approached.take(approached.order).select_apart(2 * tuning.leaders, tuning.basin_distance))
     else:
-        refined = _add_basins(box, ranked.select_apart(tuning.leaders, tuning.apart))
-    boldest = draws.take(np.argsort(draws.objective, kind="stable")[: tuning.ranked])
+        refined = _add_basins(box, ranked.select_apart(tuning.leaders, tuning.basin_distance))
+    boldest = draws.take(np.argsort(draws.objective, kind="stable")[: tuning.ranked_designs])
     objectives = draws.objective[np.isfinite(draws.objective)]
     spread = float(np.subtract(*np.percentile(objectives, [75, 25]))) if objectives.size else 0.0
     leading = coefficients_of(problem, problem.ordered(box.space.designs(ranked.u)))[0]
     a0 = np.nan_to_num(np.broadcast_to(leading, len(ranked)))
-    is_singular = bool(a0.min() <= 0 <= a0.max() or np.abs(a0).min() < tuning.vanishing * np.median(np.abs(a0)))
+    is_singular = bool(a0.min() <= 0 <= a0.max() or np.abs(a0).min() < tuning.vanishing_share * np.median(np.abs(a0)))
     return Sample(
-        box, refined.take(refined.order), boldest.select_apart(tuning.bold, tuning.apart), spread, is_singular
+        box,
+        refined.take(refined.order),
+        boldest.select_apart(tuning.infeasible_leaders, tuning.basin_distance),
+        spread,
+        is_singular,
     )
 
 
 def _draw_points(space: UnitBox, seed: int, tuning: Tuning) -> Array:
     """Draw the points of a sample: a third have all parameters near 0, a third have some near 0; a few lie on faces."""
     problem, size = space.problem, space.size
-    relative_cost = max(1, len(problem.cases)) * (1 if problem.model.degree <= 4 else tuning.slower)
-    max_count = min(tuning.first * 4 ** min(size, 4), tuning.most)
-    count = max(max_count // relative_cost, tuning.least)
+    relative_cost = max(1, len(problem.cases)) * (1 if problem.model.degree <= 4 else tuning.higher_degree_cost)
+    max_count = min(tuning.base_sample * 4 ** min(size, 4), tuning.max_sample)
+    count = max(max_count // relative_cost, tuning.min_sample)
     offset = np.random.default_rng(seed).random(size)
     u = (offset + np.arange(1, count + 1)[:, None] * golden_steps(size)) % 1.0
     index = np.arange(count)[:, None]
     is_near_zero = (index % 3 == 1) | ((index % 3 == 2) & (index // 3 >> np.arange(size) & 1 == 1))
     u = np.where(is_near_zero, space.sample_near_zero(u), u)
-    u[:: tuning.faces] = np.clip(3 * u[:: tuning.faces] - 1, 0.0, 1.0)
-    corners = np.array(list(product((0.0, 1.0), repeat=size))) if size <= tuning.corners else np.empty((0, size))
+    u[:: tuning.face_copies] = np.clip(3 * u[:: tuning.face_copies] - 1, 0.0, 1.0)
+    corners = (
+        np.array(list(product((0.0, 1.0), repeat=size)))
+        if size <= tuning.max_corner_parameters
+        else np.empty((0, size))
+    )
     return np.concatenate([np.full((1, size), 0.5), corners, u])
 
 
 def _make_batch(u: Array, scores: DesignScores, scales: Array, tuning: Tuning) -> DesignBatch:
     objective = np.zeros(len(u)) if scores.worth is None else scores.worth
     excess = scores.excess / scales[:, None]
-    violation = np.where(excess <= tuning.met, 0.0, excess).sum(axis=0)
+    violation = np.where(excess <= tuning.limit_tolerance, 0.0, excess).sum(axis=0)
     return DesignBatch(u, np.where(np.isfinite(objective), objective, np.inf), violation)
 
 
@@ -322,11 +334,11 @@ def _add_basins(box: Box, leaders: DesignBatch) -> DesignBatch:
     count, start = len(leaders), leaders.join(box.draws.take(rows[: tuning.basins]))
     step_sizes: list[float | Array] = [
         np.concatenate([np.full((count, 1, box.space.size), of_box), of_cell * cell_sizes[: tuning.basins, None]])
-        for of_box, of_cell in zip((*tuning.reaches, tuning.reaches[-1]), tuning.basin_reaches, strict=True)
+        for of_box, of_cell in zip((*tuning.step_sizes, tuning.step_sizes[-1]), tuning.basin_step_sizes, strict=True)
     ]
-    batch = box.refine(start, step_sizes, tuning.basin_local)
+    batch = box.refine(start, step_sizes, tuning.basin_neighbour_count)
     basins = batch.take(np.arange(count, len(batch)))
-    return batch.take(np.arange(count)).join(basins.take_best(tuning.deepest))
+    return batch.take(np.arange(count)).join(basins.take_best(tuning.deepest_basins))
 
 
 def find_basins(batch: DesignBatch, coordinates: Array, slopes: Array, tuning: Tuning = TUNING) -> tuple[Rows, Array]:
@@ -343,7 +355,7 @@ def find_basins(batch: DesignBatch, coordinates: Array, slopes: Array, tuning: T
         size of the cell around each of these designs.
     """
     size = batch.u.shape[1]
-    cells_per_design = min(tuning.cells, 3**size / (4 * (size + 2)))
+    cells_per_design = min(tuning.cells_per_design, 3**size / (4 * (size + 2)))
     count = max(int((cells_per_design * len(batch)) ** (1 / size)), 4)
     rank = np.empty(len(batch), dtype=int)
     rank[batch.order] = np.arange(len(batch))

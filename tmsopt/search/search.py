@@ -57,7 +57,7 @@ def search_nested(state: SearchState) -> Outcome | None:
 def _assess_search(state: SearchState, policy: Policy) -> Outcome | None:
     """Return the best design of a finished search, with its status."""
     problem, best, fallback = state.problem, state.best, state.fallback
-    starts = count_starts(state.ends, best.end.objective if best else math.nan, state.tuning.same)
+    starts = count_starts(state.ends, best.end.objective if best else math.nan, state.tuning.same_objective)
     if fallback:
         outcome = replace(
             assess_design(problem, fallback.design, fallback.words),
@@ -82,7 +82,7 @@ def add_worst_cases(state: SearchState, policy: Policy, starts: Starts) -> Outco
         )
         state = climb_state if climb_state.best else state
     best, worst_cases = state.best, dict[str, Worst]()
-    for _ in range(tuning.far_rounds if problem.asks_radius else tuning.rounds):
+    for _ in range(tuning.radius_rounds if problem.asks_radius else tuning.case_rounds):
         trial = state.best
         if trial is None or best is None:
             return None
@@ -94,7 +94,7 @@ def add_worst_cases(state: SearchState, policy: Policy, starts: Starts) -> Outco
             break
         best, worst_cases = trial if is_better(problem, trial, best) else best, {}
         best_designs = [best.parameters] if best is trial else [best.parameters, trial.parameters]
-        leaders = _drop_duplicates(problem, [*best_designs, *_list_leaders(state)], tuning.alike_designs)
+        leaders = _drop_duplicates(problem, [*best_designs, *_list_leaders(state)], tuning.equal_design_distance)
         state = state.with_program(formulate(state.part, (*trial.end.nlp.cases, *new_cases)))
         state = policy.accept(try_starts(state, (Start(d) for d in leaders), exhaustive_policy))
         if _is_worse_than_leaders(state, leaders):
@@ -119,7 +119,7 @@ def _is_worse_than_leaders(state: SearchState, leaders: Sequence[Mapping[str, fl
     sign, evaluations = state.problem.sign, [state.recheck(design) for design in leaders]
     best_known = min((sign * c.objective for c in evaluations if not c.violations), default=math.inf)
     value = sign * state.best.checked.objective
-    return value > best_known and not same_objective(value, best_known, state.nlp.size, state.tuning.same)
+    return value > best_known and not same_objective(value, best_known, state.nlp.size, state.tuning.same_objective)
 
 
 def _find_worse_cases(problem: Posed, trial: CheckedEnd, worst_cases: Mapping[str, Worst]) -> list[Case]:
@@ -150,4 +150,4 @@ def _drop_duplicates(problem: Posed, designs: Sequence[Mapping[str, float]], sha
 
 def _list_leaders(state: SearchState) -> list[dict[str, float]]:
     """Return the designs of the best few distinct optima."""
-    return [state.design_at(end) for end in select_distinct_ends(state.ends)[: state.tuning.followed]]
+    return [state.design_at(end) for end in select_distinct_ends(state.ends)[: state.tuning.followed_optima]]

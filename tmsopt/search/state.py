@@ -249,7 +249,7 @@ def begin_search(
     parts = {"": problem}
     for name, (lower, upper) in problem.free.items():
         side_names = problem.parameter_set[name].sides
-        if side_names is not None and lower < -tuning.thin and upper > tuning.thin:
+        if side_names is not None and lower < -tuning.min_box_width and upper > tuning.min_box_width:
             parts = {}
             for side, low, high in ((side_names[1], 0.0, upper), (side_names[0], lower, 0.0)):
                 start = problem.start if low <= problem.start.get(name, low) <= high else {}
@@ -277,7 +277,7 @@ def clip_to_box(problem: Posed, design: Mapping[str, float]) -> dict[str, float]
     return {n: min(max(design[n], low), high) for n, (low, high) in problem.free.items()}
 
 
-def same_objective(a: float, b: float, size: float = 1.0, tolerance: float = TUNING.same) -> bool:
+def same_objective(a: float, b: float, size: float = 1.0, tolerance: float = TUNING.same_objective) -> bool:
     """Whether two objectives count as the same optimum; `size` is the least scale of the comparison."""
     return abs(a - b) <= tolerance * (size + abs(b))
 

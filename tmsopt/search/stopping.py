@@ -21,27 +21,29 @@ def is_enough(state: SearchState) -> bool:
     if not feasible:
         return is_hopeless(state)
     best, count = min(end.objective for end in feasible), len(state.ends)
-    starts = count_starts(state.ends, best, tuning.same)
+    starts = count_starts(state.ends, best, tuning.same_objective)
     if state.problem.objective is None:
         freedom = degrees_of_freedom(state.part).count
-        is_isolated = freedom == 0 or (freedom < 0 and best <= tuning.met_conditions)
-        return starts.at_best >= (1 if is_isolated else tuning.agree)
+        is_isolated = freedom == 0 or (freedom < 0 and best <= tuning.zero_squares)
+        return starts.at_best >= (1 if is_isolated else tuning.agreeing_starts)
     if state.ends[-1].objective == best and is_proven(state, state.ends[-1]):
         return True
     if sample is None:
-        return count >= tuning.fewest_blind and starts.at_best >= tuning.agree and starts.suffice()
+        return (
+            count >= tuning.min_starts_without_sample and starts.at_best >= tuning.agreeing_starts and starts.suffice()
+        )
     separate_count = sum(bool(sample.refined.violation[row] == 0) for row in state.left if row < len(sample.refined))
-    can_end = count >= tuning.fewest_narrow or not sample.box.is_narrow
+    can_end = count >= tuning.min_starts_if_narrow or not sample.box.is_narrow
     # A sampled design that leads straight to no end may lie in a basin of its own.
-    return (can_end and starts.suffice(separate_count)) or count - len(feasible) >= 2 * tuning.hopeless
+    return (can_end and starts.suffice(separate_count)) or count - len(feasible) >= 2 * tuning.hopeless_starts
 
 
 def is_hopeless(state: SearchState) -> bool:
     """Whether so many starts failed that others are unlikely to succeed."""
     tuning, sample, failure_count = state.tuning, state.sample, len(state.ends) - len(state.feasible)
-    if failure_count >= tuning.hopeless_afar and (sample.is_far_off if sample else state.out_of_reach):
+    if failure_count >= tuning.hopeless_far_starts and (sample.is_far_off if sample else state.out_of_reach):
         return True
-    return failure_count >= (tuning.hopeless if sample else 2 * tuning.hopeless)
+    return failure_count >= (tuning.hopeless_starts if sample else 2 * tuning.hopeless_starts)
 
 
 def is_proven(state: SearchState, end: LocalEnd) -> bool:
@@ -55,7 +57,7 @@ def is_proven(state: SearchState, end: LocalEnd) -> bool:
     return is_near and instant_bound(problem, end.objective).proven
 
 
-def count_starts(ends: Sequence[LocalEnd], best: float, tolerance: float = TUNING.same) -> Starts:
+def count_starts(ends: Sequence[LocalEnd], best: float, tolerance: float = TUNING.same_objective) -> Starts:
     """Count starts by their ends; a sampled design that leads straight to an end counts as a start."""
     feasible = [end for end in ends if end.feasible]
     objectives = sorted(end.objective for end in feasible)
@@ -69,7 +71,7 @@ def count_starts(ends: Sequence[LocalEnd], best: float, tolerance: float = TUNIN
     )
 
 
-def select_distinct_ends(ends: Sequence[LocalEnd], tolerance: float = TUNING.same) -> list[LocalEnd]:
+def select_distinct_ends(ends: Sequence[LocalEnd], tolerance: float = TUNING.same_objective) -> list[LocalEnd]:
     """Return the best end of each optimum, the best first."""
     selection: list[LocalEnd] = []
     for end in sorted((e for e in ends if e.feasible), key=lambda e: e.objective):

@@ -71,7 +71,7 @@ def _search_briefly(state: SearchState, stable_problem: Posed, is_thorough: bool
     if (
         outcome is None
         or outcome.status != "optimal"
-        or has_runaway_root(outcome.checked.structure.roots, state.tuning.runaway)
+        or has_runaway_root(outcome.checked.structure.roots, state.tuning.infinite_root_size)
     ):
         return None
     has_one_optimum = all(end.feasible for end in state.ends) and count_starts(state.ends, 0.0).optima == 1

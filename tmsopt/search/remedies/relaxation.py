@@ -284,7 +284,7 @@ def relax_each_alone(problem: Posed, options: Options, conflict: Sequence[str], 
 def _propose_designs(box: Box, name: str) -> list[dict[str, float]]:
     """Propose designs that may need a move of this limit only; none if the other limits exclude each other."""
     batch = box.ignore_limit(name)
-    return [] if batch.all_violate_by(box.tuning.far_off) else [*box.designs(batch.take_first(_SINGLE_LIMIT_STARTS))]
+    return [] if batch.all_violate_by(box.tuning.far_excess) else [*box.designs(batch.take_first(_SINGLE_LIMIT_STARTS))]
 
 
 def _has_least_sum(state: SearchState) -> bool:
