@@ -264,14 +264,14 @@ def test_the_first_python_example_runs(monkeypatch):
 @pytest.mark.parametrize(
     ("line", "constants"),
     [
-        ("problem, study and bicycle files", "files.LARGEST problem.toml.MOST_DEEP problem.toml.MOST_PARTS"),
+        ("problem, study and bicycle files", "files.LARGEST problem.toml.MAX_DEPTH problem.toml.MAX_KEY_PARTS"),
         ("errors that are listed", "errors.LISTED"),
         (
             "expressions",
             "models.expression._LONGEST models.expression._DEEPEST models.stated.degree.LARGEST_EXPONENT models.stated.degree.LARGEST_DEGREE",
         ),
         ("quantities of a model", "models.stated.texts.MOST_QUANTITIES"),
-        ("numbers of parameters", "models.exact.MOST_DIGITS problem.units.text.LONGEST"),
+        ("numbers of parameters", "models.exact.MOST_DIGITS problem.units.text.MAX_LENGTH"),
         (
             "CSV files of rows",
             "studies.files.LARGEST studies.files.LONGEST_LINE studies.files.MOST_COLUMNS studies.sampling.MOST_ROWS studies.sampling.MOST_NUMBERS",

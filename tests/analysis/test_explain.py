@@ -379,7 +379,7 @@ def test_rounding_in_one_line_says_how_many_digits_are_enough():
     digits, share = map(int, re.findall(r"to (\d) digits (?:the design|it) keeps (\d+) %", told)[-1])
     kept = {}
     for n in (2, 3, 4, 6):
-        one = {name: unit_of(design.problem.posed, name).one for name in design.problem.free}
+        one = {name: unit_of(design.problem.posed, name).factor for name in design.problem.free}
         short = {name: float(f"{design.parameters[name] / u:.{n}g}") * u for name, u in one.items()}
         a = laws.copo(**{**design.parameters, **short})
         kept[n] = np.roots(a).real.max() / design.abscissa

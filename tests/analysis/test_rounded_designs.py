@@ -53,7 +53,7 @@ def exact(solution, written):
     """The decimals, at 140 digits, and the other parameters as stored."""
     found = dict(solution.parameters)
     for name, text in written.items():
-        one = unit_of(solution.problem.posed, name).one
+        one = unit_of(solution.problem.posed, name).factor
         share = Fraction(one).limit_denominator(10**6)
         degrees = flint.arb.pi() / 180
         whole = degrees if one == math.pi / 180 else flint.arb(flint.fmpq(share.numerator, share.denominator))

@@ -201,7 +201,7 @@ def test_a_band_of_a_chain_is_proved_stable():
     k = np.linspace(0.95, 1.05, 2001)
     least = float(roots(stacked(of, fixed | {"k1": k})).real.max())
     assert prove_worst_case(problem.posed, fixed, least).proven
-    assert not prove_worst_case(problem.posed, fixed, least - 1e-3, boxes=50).proven
+    assert not prove_worst_case(problem.posed, fixed, least - 1e-3, max_boxes=50).proven
 
 
 def scatter(z, multiple, others):

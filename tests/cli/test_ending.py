@@ -100,7 +100,7 @@ def test_handlers_wait_for_ipopt(number):
     heard = []
     before = signal.signal(number, lambda *_: heard.append("handler"))
     try:
-        with import_module("tmsopt.program.ipopt").interruptible():
+        with import_module("tmsopt.program.ipopt").delay_signals():
             press(number)
             time.sleep(0)
             heard.append("solved")

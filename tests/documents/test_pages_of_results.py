@@ -249,7 +249,7 @@ def test_a_design_has_its_status_and_its_parameters(name):
     listed = {row[0]: dict(zip(head, row, strict=True)) for row in rows}
     for of in solution.problem.posed.parameter_set.parameters:
         unit, row = unit_of(solution.problem.posed, of.name), listed[of.name]
-        assert shown(row["value"], solution.parameters[of.name], unit.one), of.name
+        assert shown(row["value"], solution.parameters[of.name], unit.factor), of.name
         assert row.get("unit", "") == unit.text
         assert row["meaning"] == of.meaning
         assert row["free or fixed"] == ("free" if of.name in solution.problem.free else "fixed")
@@ -264,7 +264,7 @@ def test_quantities_are_those_of_the_design():
     assert head[:3] == ["quantity", "value", "unit"]
     assert len(rows) > 5
     for name, value, unit, _ in rows:
-        one = 0.01 if unit == "%" else unit_of(solution.problem.posed, name).one
+        one = 0.01 if unit == "%" else unit_of(solution.problem.posed, name).factor
         assert float(value) == pytest.approx(solution.quantities[name] / one, rel=1e-5, abs=1e-9), name
 
 
@@ -276,7 +276,7 @@ def test_what_limits_are_worth():
     worth = tables["Effect of the active limits"][1:]
     assert [row[0] for row in worth] == [lever.name for lever in levers]
     for row, lever in zip(worth, levers, strict=True):
-        assert float(row[-1].split()[0]) == pytest.approx(lever.predicted / lever.gained.one, rel=5e-3)
+        assert float(row[-1].split()[0]) == pytest.approx(lever.predicted / lever.gained.factor, rel=5e-3)
     stands = {row[0]: row[-1] for row in tables["Limits and their status"][1:]}
     assert stands["steer_arm"] == "active"
     assert stands["rear_wheel_holds"] == f"holds by {solution.quantities['N_R'] - 20:.4g} N"

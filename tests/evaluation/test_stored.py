@@ -98,7 +98,7 @@ def test_roots_near_a_4_fold_one_are_those_of_the_doubles():
     found = recheck(tmsopt.Problem(from_coefficients([1, *"abcd"]), fixed=fixed).posed, fixed)
     exact = float(max(z.real for z in roots_60([mp.mpf(1), *map(mp.mpf, fixed.values())])))
     assert found.structure.abscissa == pytest.approx(exact, abs=1e-14)
-    assert found.realised == pytest.approx(exact, abs=1e-14)
+    assert found.abscissa_realised == pytest.approx(exact, abs=1e-14)
 
 
 @pytest.mark.parametrize("end", [0.36, 0.30956709128158444])

@@ -123,12 +123,12 @@ def test_a_proven_limit_is_never_below_a_dense_sample(varied, steps):
     for design in some_designs(2, seed=7 * steps):
         problem = fixed(design, **varied)
         worst = worst_cases(problem)["abscissa"].value
-        found = prove(problem, worst, boxes=600)
+        found = prove(problem, worst, max_boxes=600)
         assert found.limit >= worst
         assert found.limit == pytest.approx(worst, abs=2e-6 * (1 + abs(worst)))
         if found.proven:
             assert float(sampled(problem, design, hunt.abscissa, steps).max()) <= found.limit
-        low = prove(problem, worst - 1e-3 * (1 + abs(worst)), boxes=60)
+        low = prove(problem, worst - 1e-3 * (1 + abs(worst)), max_boxes=60)
         assert not low.proven
 
 
@@ -138,14 +138,14 @@ def test_a_band_is_proven_in_a_few_boxes_and_not_when_they_are_too_few():
     found = prove(problem, worst)
     assert found.proven
     assert found.boxes > 1
-    assert not prove(problem, worst, boxes=found.boxes - 1).proven
+    assert not prove(problem, worst, max_boxes=found.boxes - 1).proven
 
 
 def test_a_singular_mass_matrix_in_a_band_is_not_proven():
     """a0 vanishes where tan lambda_s = (chi_H − 1)/zeta_H: 0.1 here, whatever the limit that is asked."""
     problem = fixed({**DESIGN, "chi_H": 0.98}, scenarios={"lambda_s": Band(0.05, 0.3)})
     for limit in (0.0, 1.0, 1e6):
-        assert not prove(problem, limit, boxes=300).proven
+        assert not prove(problem, limit, max_boxes=300).proven
     clear = fixed({**DESIGN, "chi_H": 0.98}, scenarios={"lambda_s": Band(0.2, 0.3)})
     assert prove(clear, worst_cases(clear)["abscissa"].value).proven
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import tmsopt
-from tmsopt.guide import STARTS, companions, example, examples, new_problem
+from tmsopt.guide import TEMPLATES, companions, example, examples, new_problem
 
 ROOT = Path(__file__).parents[2]
 
@@ -24,7 +24,7 @@ def file_of(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", STARTS)
+@pytest.mark.parametrize("kind", TEMPLATES)
 def test_a_new_problem_solves_as_it_stands(kind, file_of):
     design = tmsopt.solve(file_of(new_problem(kind)))
     assert design.status == "optimal"
@@ -32,7 +32,7 @@ def test_a_new_problem_solves_as_it_stands(kind, file_of):
     assert max(map(len, new_problem(kind).splitlines())) <= 100
 
 
-@pytest.mark.parametrize("kind", STARTS)
+@pytest.mark.parametrize("kind", TEMPLATES)
 def test_a_new_problem_solves_with_every_hint_taken(kind, file_of):
     """What its comments offer instead of the objective reads as well."""
     text = new_problem(kind)

@@ -8,7 +8,7 @@ import jsonschema
 import pytest
 
 import tmsopt
-from tmsopt.guide import SCHEMA_FILE, STARTS, new_problem, schema_text
+from tmsopt.guide import SCHEMA_FILE, TEMPLATES, new_problem, schema_text
 from tmsopt.models import gain_names
 
 PROBLEMS = sorted(Path("problems").glob("*.toml"))
@@ -123,7 +123,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("text", [GOOD, STEERED, STUDY, OWN, *map(new_problem, STARTS)])
+@pytest.mark.parametrize("text", [GOOD, STEERED, STUDY, OWN, *map(new_problem, TEMPLATES)])
 def test_what_they_are_made_from_fits_and_every_new_problem(text):
     assert faults(text) == []
 

@@ -221,20 +221,20 @@ def test_critical_speeds_are_those_of_the_roots(built):
             assert y[k] == pytest.approx(critical_60(chi_B=x[k], **geometry), rel=1e-11)  # cancels near the poles
             assert is_stable_60(polynomial_60(Fr=y[k] * 1.001, chi_B=x[k], **geometry))
             assert not is_stable_60(polynomial_60(Fr=y[k] * 0.999, chi_B=x[k], **geometry))
-        near = [critical_60(chi_B=data.best[0] + step, **geometry) for step in (-1e-3, 0.0, 1e-3)]
-        assert near[1] == pytest.approx(data.best[1], rel=1e-12)
+        near = [critical_60(chi_B=data.minimum[0] + step, **geometry) for step in (-1e-3, 0.0, 1e-3)]
+        assert near[1] == pytest.approx(data.minimum[1], rel=1e-12)
         assert near[1] < min(near[0], near[2])
-        assert np.nanmin(y) >= data.best[1] * (1 - ROUNDING)
-        for edge in data.flat:
-            assert critical_60(chi_B=edge, **geometry) == pytest.approx(1.01 * data.best[1], rel=1e-10)
+        assert np.nanmin(y) >= data.minimum[1] * (1 - ROUNDING)
+        for edge in data.flat_range:
+            assert critical_60(chi_B=edge, **geometry) == pytest.approx(1.01 * data.minimum[1], rel=1e-10)
 
 
 def test_optimum_at_chi_H_1_is_the_law(built):
     """A minimum is found to the square root of rounding; its value to rounding."""
     ratio = 1.158 / 0.526
-    assert built.critical[0].best[0] == pytest.approx(math.sqrt(ratio), abs=1e-6)
+    assert built.critical[0].minimum[0] == pytest.approx(math.sqrt(ratio), abs=1e-6)
     r = math.sqrt(ratio)
-    assert built.critical[0].best[1] == pytest.approx(
+    assert built.critical[0].minimum[1] == pytest.approx(
         math.sqrt((r + 1) / (r - 1) * math.tan(built.lambda_s)), rel=1e-12
     )
 
@@ -248,7 +248,7 @@ def test_less_tilt_than_stated_is_not_stable(built):
         ]
         assert any(np.roots(c).real.max() < 0 for c in a) is stable
     for curve in experiment(built.least_tilt - 0.01).critical[1:]:
-        assert np.isnan([*curve.Fr_c, *curve.best, curve.own, *curve.flat]).all()
+        assert np.isnan([*curve.Fr_c, *curve.minimum, curve.experimental_Fr_c, *curve.flat_range]).all()
 
 
 # The universal chart
@@ -318,18 +318,18 @@ def test_drawn_paths_are_those_of_table_1():
     solid = [line.get_data_3d() for line in box.lines if line.get_gid() == "path"]
     speeds = (FR_C_EP4, FR_EP4), (1.482682090, 2.257421384), (3.934331969, 4.103508160)  # Fr_c, and of the EP
     for path, flat, (x, y, z), (Fr_c, Fr_EP) in zip(paths, drawn(section, "path"), solid, speeds, strict=True):
-        assert path.stable[1] == pytest.approx(2, abs=1e-12)
+        assert path.stability_onset[1] == pytest.approx(2, abs=1e-12)
         assert path.A[:, 0] == pytest.approx(path.A[:, 2], rel=1e-12)
-        assert path.exceptional == pytest.approx(ep_set(path.exceptional[0]), rel=1e-12)
+        assert path.exceptional_point == pytest.approx(ep_set(path.exceptional_point[0]), rel=1e-12)
         shown = (path.A[:, 0] <= 8) & (path.A[:, 1] <= 18)
         assert flat == pytest.approx(path.A[shown, :2])
         assert np.stack([x, z, y], axis=1) == pytest.approx(path.A[shown], rel=1e-12)
         # at χ_H = 1, A1 is proportional to Fr
-        assert path.stable[0] / path.exceptional[0] == pytest.approx(Fr_c / Fr_EP, abs=1e-8)
+        assert path.stability_onset[0] / path.exceptional_point[0] == pytest.approx(Fr_c / Fr_EP, abs=1e-8)
         (mark,) = drawn(section, path.name)
-        assert mark[0] == pytest.approx(path.exceptional[:2])
-    assert paths[0].exceptional == pytest.approx([4, 6, 4], rel=1e-12)
-    assert paths[1].exceptional[0] > 4 > paths[2].exceptional[0]
+        assert mark[0] == pytest.approx(path.exceptional_point[:2])
+    assert paths[0].exceptional_point == pytest.approx([4, 6, 4], rel=1e-12)
+    assert paths[1].exceptional_point[0] > 4 > paths[2].exceptional_point[0]
     assert {line.get_linestyle() for line in section.lines if line.get_gid() == "ep-set"} == {"--", "-"}
 
 

@@ -18,7 +18,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt.problem import parse_value
-from tmsopt.problem.units import USUAL, dimension, parse_exact_quantity, parse_quantity, pint_factor, unit_factor
+from tmsopt.problem.units import COMMON_UNITS, dimension, parse_exact_quantity, parse_quantity, pint_factor, unit_factor
 
 AT_ONCE = 1.0
 """Seconds; pint needs a third of one to start."""
@@ -92,7 +92,9 @@ def test_the_parameters_own_unit_changes_nothing(number):
         assert parse_quantity(f"{number!r} {unit}", unit) == number
 
 
-@pytest.mark.parametrize(("written", "unit"), [(written, unit) for unit, table in USUAL.items() for written in table])
+@pytest.mark.parametrize(
+    ("written", "unit"), [(written, unit) for unit, table in COMMON_UNITS.items() for written in table]
+)
 def test_usual_units_are_as_pint_has_them(written, unit, monkeypatch):
     """To the last bit of what is read and shown, for every one of the table that spares loading pint."""
     texts = [f"{number} {written}" for number in ("1", "-0.7", "3.1e5", "12.345678", "1e-9", "0")]

@@ -181,4 +181,4 @@ def test_no_design_on_the_edge_is_said_to_be_the_least_unstable():
 def test_a_share_of_a_value_is_written_as_its_amount(tmp_path):
     """5 % of a mass of 5 kg is 0.25 kg; 0.05 would be 0.05 kg."""
     found = faults(tmp_path, 'model = "tms"\n[tolerances]\nm_B = "5 %"\n[parameters]\nm_B = "5 kg"\n')
-    assert any("5 % of a value as its amount" in fault for fault in found)
+    assert any("for 5 % of a value, write the amount" in fault for fault in found)

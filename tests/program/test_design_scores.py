@@ -61,12 +61,12 @@ def test_the_recheck_says_the_same_of_each_design(asked):
     stated, drawn = problem(**asked), designs(40, seed=3)
     found = judged(stated, drawn)
     names = list(stated.conditions)
-    assert found.equal.tolist() == [name in ("tied", "held") for name in names]
+    assert found.is_equality.tolist() == [name in ("tied", "held") for name in names]
     for k, design in enumerate(drawn):
         parameters = stated.ordered({n: design[n] for n in stated.free})
         checked = recheck(stated, parameters, stated.cases)
         amounts = rechecking.measure_excesses(stated, parameters, stated.cases)
-        assert found.worth[k] == pytest.approx(stated.sign * checked.objective, rel=SIMPLE, abs=SIMPLE)
+        assert found.objective[k] == pytest.approx(stated.sign * checked.objective, rel=SIMPLE, abs=SIMPLE)
         for name, own in zip(names, found.excess[:, k], strict=True):
             # Where a root is real and positive the ratio is -1, whatever the design: the abscissa tells designs apart.
             flat = name == "sway" and amounts[name] == pytest.approx(1.3, abs=1e-12)
@@ -86,16 +86,16 @@ def test_root_quantities_are_the_worst_of_all_cases_and_an_equality_that_of_the_
     ).posed
     found = design_scores.score_designs(stated, {"x": np.array([3.0, 4.0, 6.0])})
     # The objective: x is 1 more at worst, beside the worst abscissa.
-    assert found.worth == pytest.approx([4.0, 4.0, 4.0], abs=1e-12)
+    assert found.objective == pytest.approx([4.0, 4.0, 4.0], abs=1e-12)
     assert found.excess == pytest.approx(np.array([[0.5, 0, 0], [1.0, 0, 2.0], [2.0, 1.0, 0]]), abs=1e-12)
-    assert found.beyond[list(stated.conditions).index("decay")] == pytest.approx([0.5, -0.5, -2.5], abs=1e-12)
+    assert found.signed_excess[list(stated.conditions).index("decay")] == pytest.approx([0.5, -0.5, -2.5], abs=1e-12)
 
 
 def test_of_an_equality_the_difference_alone_counts():
     """Of s² + x s − 1, one root of which is positive, the damping ratio is −1 whatever x is; no abscissa is added."""
     model = from_coefficients([1, x, -1])
     stated = tmsopt.Problem(model, free={"x": (0.0, 1.0)}, constraints={"flat": "0.3 == damping_ratio"}).posed
-    assert design_scores.score_designs(stated, {"x": np.array([0.0, 0.5])}).beyond[0] == pytest.approx(
+    assert design_scores.score_designs(stated, {"x": np.array([0.0, 0.5])}).signed_excess[0] == pytest.approx(
         [1.3, 1.3], abs=1e-12
     )
 
@@ -109,6 +109,6 @@ def test_a_design_without_motion_is_none():
     found = design_scores.score_designs(
         stated, {"x": np.array([0.0, 0.5, -0.5, 0.0]), "y": np.array([1.0, 0.0, 1.0, 0.0])}
     )
-    assert np.isfinite(found.worth).tolist() == [False, False, True, False]
+    assert np.isfinite(found.objective).tolist() == [False, False, True, False]
     assert found.excess.tolist() == [[np.inf, np.inf, 0.0, np.inf]]
     assert set(recheck(stated, {"x": 0.0, "y": 1.0}).violations) == {"a0"}

@@ -24,7 +24,7 @@ def asked(degree, objective):
 def test_any_design_has_such_factors(degree, objective, sign):
     """With a0 of either sign, small or not: a start meets all rows, and says of the roots what NumPy does."""
     problem, rng = asked(degree, objective), np.random.default_rng(degree)
-    nlp = formulate(problem.posed, lead=sign)
+    nlp = formulate(problem.posed, a0_sign=sign)
     names = nlp.variables[degree + 1 :]
     for a0 in (1.0, 0.3, 1e-2, 1e-3):
         a = sign * np.array([a0, *rng.uniform(0.5, 2, degree)])

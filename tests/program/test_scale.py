@@ -24,7 +24,7 @@ def test_the_unit_is_that_of_the_roots(rate):
     """All roots are −r with the median r at the rate: the nearest power of 2 is at most √2 off, and so is 2."""
     found = scale_of(powers(rate, minimize="abscissa").posed)
     assert abs(math.log2(found.unit / rate)) <= 0.55  # the median over the designs is a little off the middle
-    assert found.lead == 2.0
+    assert found.a0_unit == 2.0
     assert math.frexp(found.unit)[0] == 0.5
 
 

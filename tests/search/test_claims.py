@@ -264,7 +264,7 @@ def test_roots_as_stored_lie_where_the_multiple_ones_allow(roots, stored, said, 
     """An m-fold root is off by the m-th root of what its coefficients are: 1e-8 at most."""
     listed = [Root(re, 0.0, m) for re, m in roots]
     structure = SimpleNamespace(roots=listed, abscissa=max(re for re, _ in roots))
-    checked = SimpleNamespace(structure=structure, realised=stored)
+    checked = SimpleNamespace(structure=structure, abscissa_realised=stored)
     unclear = import_module("tmsopt.search.outcome").is_unclear(replace(PLAIN, **asked).posed, checked)
     assert bool(unclear) is said
 

@@ -39,8 +39,8 @@ def test_a_design_has_one_point_of_the_cube_and_a_point_one_design():
     space = cube()
     for u in np.random.default_rng(0).random((200, space.size)):
         design = {n: float(v) for n, v in space.designs(u).items()}
-        assert space.points(design) == pytest.approx(u, abs=1e-13)
-        again = space.designs(space.points(design))
+        assert space.point(design) == pytest.approx(u, abs=1e-13)
+        again = space.designs(space.point(design))
         assert {n: float(v) for n, v in again.items()} == pytest.approx(design, rel=1e-12, abs=1e-12)
 
 
@@ -123,7 +123,7 @@ def test_a_pole_is_approached_from_its_own_side():
     """1/(x − y) ≥ 1000 is met for 0 < x − y ≤ 0.001, and from x < y by no small step."""
     box = draw_box(problem(("1/(x - y) >= 1000",)).posed, 0)
     gaps = np.geomspace(2e-3, 0.2, 20)
-    points = [box.space.points({"x": 0.3 + gap / 2, "y": 0.3 - gap / 2}) for gap in gaps]
+    points = [box.space.point({"x": 0.3 + gap / 2, "y": 0.3 - gap / 2}) for gap in gaps]
     ends = box.approach_limits(box.judge_points(np.array(points)))
     found = box.space.designs(ends.u)
     assert np.all(found["x"] - found["y"] > 0)

@@ -48,7 +48,7 @@ def find_better_design(program: LocalProgram, conditions: Conditions, solution: 
         design |= {n: solution.parameters[n] for n in problem.free if n not in at}
         checked = recheck(problem, parameters := problem.ordered(design))
         # the stored doubles must also be better
-        value = max(checked.objective, checked.realised) if minimizes_abscissa(problem) else checked.objective
+        value = max(checked.objective, checked.abscissa_realised) if minimizes_abscissa(problem) else checked.objective
         if not checked.violations and problem.sign * (reference - value) > _MIN_IMPROVEMENT * (1 + abs(reference)):
             return BetterDesign(Table(parameters), value, order)
     return None

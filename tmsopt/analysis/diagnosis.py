@@ -11,7 +11,7 @@ from tmsopt.analysis.root_point import RootPoint, evaluate_pencil, high_precisio
 from tmsopt.analysis.splitting import DEVIATION, Law, Response, compute_response
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
-from tmsopt.problem.files import Given
+from tmsopt.problem.files import ProblemSource
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Numbers, Printable, plain
 from tmsopt.roots import Root, Structure, backward_error
@@ -73,7 +73,7 @@ class Diagnosis(Printable):
         }
 
 
-def diagnose(design: Given, *, progress: Listener | None = None) -> tuple[Diagnosis, ...]:
+def diagnose(design: ProblemSource, *, progress: Listener | None = None) -> tuple[Diagnosis, ...]:
     """Diagnose every multiple root of a design, rightmost first; empty if all roots are simple.
 
     The structure of the solution gives the algebraic multiplicity. Ranks of the model's matrices, at the root of the

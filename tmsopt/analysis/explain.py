@@ -8,7 +8,7 @@ from tmsopt.analysis.limits import Lever, find_levers
 from tmsopt.analysis.optimality import Optimality, optimality
 from tmsopt.analysis.rounding import RoundedDesign, list_rounded_designs
 from tmsopt.analysis.summary import list_warnings, summarise
-from tmsopt.problem.files import Given
+from tmsopt.problem.files import ProblemSource
 from tmsopt.problem.solution import Bound
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Table, Tabular, plain
@@ -66,7 +66,7 @@ class Explanation(Tabular):
         return data | {"worst": self.worst or None}
 
 
-def explain(design: Given, *, resolve: bool = True, progress: Listener | None = None) -> Explanation:
+def explain(design: ProblemSource, *, resolve: bool = True, progress: Listener | None = None) -> Explanation:
     """Explain a solution. A solution that is not optimal gets fewer facts.
 
     Args:

@@ -125,7 +125,7 @@ def move_limit(problem: Posed, name: str, step: float) -> Posed:
     if name in problem.constraints:
         text = problem.constraints[name]
         limit = split_limit(text)
-        if limit and not limit.behind:  # the number is the right-hand side
+        if limit and not limit.text_after:  # the number is the right-hand side
             text = limit.replace_number(repr(limit.value + step))
         else:
             left, sign, right = written_sides(text)

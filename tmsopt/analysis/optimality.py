@@ -26,7 +26,7 @@ from tmsopt.analysis.descent import BetterDesign, find_better_design
 from tmsopt.analysis.program import LocalProgram, NotCovered, build_program
 from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
 from tmsopt.problem.dependence import demands_heavy_damping
-from tmsopt.problem.files import Given
+from tmsopt.problem.files import ProblemSource
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ROOT_NAMES
 from tmsopt.problem.solution import Solution
@@ -120,7 +120,7 @@ class Optimality(Printable):
         return data if self.better else {n: x for n, x in data.items() if n not in ("better", "better_value")}
 
 
-def optimality(design: Given, *, progress: Listener | None = None) -> Optimality:
+def optimality(design: ProblemSource, *, progress: Listener | None = None) -> Optimality:
     """Judge a design by the first-order and, if needed, second-order conditions on its factors.
 
     If a pattern was located without an objective, the abscissa is judged, within the ranges and constraints.
@@ -199,7 +199,7 @@ def _choose_problem(solution: Solution) -> Posed:
     if "abscissa" in nlp.variables:
         x[nlp.variables.index("abscissa")] = solution.abscissa / nlp.unit
     rows = nlp.evaluate(nlp.set_kinks(x))[1]
-    if any(np.sort(rows[list(kink.rows)])[1] <= _TOLERANCE for kink in nlp.kinks if not kink.quotient):
+    if any(np.sort(rows[list(kink.rows)])[1] <= _TOLERANCE for kink in nlp.kinks if not kink.is_quotient):
         raise NotCovered("an abs, min or max has its kink there")
     return problem
 

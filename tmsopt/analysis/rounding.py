@@ -10,7 +10,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from tmsopt.evaluation.recheck import FEASIBLE, recheck_exactly
+from tmsopt.evaluation.recheck import FEASIBILITY_TOLERANCE, recheck_exactly
 from tmsopt.evaluation.worst_case import find_worst_cases
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Posed
@@ -108,31 +108,31 @@ def _find_range_violations(problem: Posed, design: Mapping[str, Any]) -> dict[st
         f"{name}.{end}": amount
         for name, ends in problem.free.items()
         for end, limit, side in zip(("min", "max"), ends, (-1.0, 1.0), strict=True)
-        if (amount := side * (float(design[name]) - limit)) > FEASIBLE * max(1.0, abs(limit))
+        if (amount := side * (float(design[name]) - limit)) > FEASIBILITY_TOLERANCE * max(1.0, abs(limit))
     }
 
 
 def _is_short(solution: Solution, name: str) -> bool:
     """Whether a parameter has so few digits that rounding leaves it unchanged."""
     value, unit = solution.parameters[name], unit_of(solution.problem.posed, name)
-    return abs(float(_format_decimal(solution, name, unit, ALONE)) * unit.one - value) <= _UNROUNDED * abs(value)
+    return abs(float(_format_decimal(solution, name, unit, ALONE)) * unit.factor - value) <= _UNROUNDED * abs(value)
 
 
 def _format_decimal(solution: Solution, name: str, unit: Unit, digits: int) -> str:
     """A parameter in the unit of the report as a decimal; at an end of its range it is rounded inwards."""
-    value = solution.parameters[name] / unit.one
-    low, high = (end / unit.one for end in solution.problem.free.get(name, (-math.inf, math.inf)))
+    value = solution.parameters[name] / unit.factor
+    low, high = (end / unit.factor for end in solution.problem.free.get(name, (-math.inf, math.inf)))
     text = f"{value:#.{digits}g}".removesuffix(".")
     step = Decimal((0, (1,), int(Decimal(text).as_tuple().exponent)))
     for excess, change in ((float(text) - high, -step), (low - float(text), step)):
-        if excess > FEASIBLE * max(1.0, abs(value)):
+        if excess > FEASIBILITY_TOLERANCE * max(1.0, abs(value)):
             text = str(Decimal(text) + change)
     return text
 
 
 def _parse_exact(text: str, unit: Unit) -> flint.arb:
     """The decimal number in the unit in which the parameter is stored, at the precision of the context."""
-    if unit.one == _DEGREE:
+    if unit.factor == _DEGREE:
         return flint.arb(text) * flint.arb.pi() / 180
-    share = Fraction(unit.one).limit_denominator(_LARGEST_DENOMINATOR)
+    share = Fraction(unit.factor).limit_denominator(_LARGEST_DENOMINATOR)
     return flint.arb(text) * flint.arb(flint.fmpq(share.numerator, share.denominator))

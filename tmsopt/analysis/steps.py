@@ -53,12 +53,12 @@ def step_within(
 def _list_steps(unit: Unit, stored_unit: str, size: float) -> Iterator[LimitStep]:
     """The natural step, and then smaller and smaller steps."""
     size = abs(size) if abs(size) > _ZERO_SIZE else 1.0
-    largest = _round_to_1_2_5(_NATURAL_STEPS.get(stored_unit, _STEP_SHARE * size) / unit.one)
-    while stored_unit in _NATURAL_STEPS and largest * unit.one > _MAX_SHARES[stored_unit] * size:
+    largest = _round_to_1_2_5(_NATURAL_STEPS.get(stored_unit, _STEP_SHARE * size) / unit.factor)
+    while stored_unit in _NATURAL_STEPS and largest * unit.factor > _MAX_SHARES[stored_unit] * size:
         largest /= 10
     step = largest
     while step >= _MIN_SHARE * largest:
-        yield LimitStep(step * unit.one, unit.show(step * unit.one, 4))
+        yield LimitStep(step * unit.factor, unit.show(step * unit.factor, 4))
         step = _round_to_1_2_5(step / 2.2)
 
 

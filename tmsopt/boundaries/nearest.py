@@ -20,7 +20,7 @@ from tmsopt.boundaries.rays import (
 )
 from tmsopt.boundaries.weighted_design import WeightedDesign, weight_design
 from tmsopt.errors import InputError, input_error, suggest, table_faults
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.program.ipopt import make_ipopt
@@ -149,7 +149,7 @@ class Robustness(Printable):
 
 
 def nearest(
-    design: Given,
+    design: ProblemSource,
     pattern: str,
     *,
     parameters: Numbers | None = None,
@@ -190,7 +190,7 @@ def nearest(
 
 
 def robustness(
-    design: Given,
+    design: ProblemSource,
     *,
     parameters: Numbers | None = None,
     weights: Numbers | None = None,
@@ -254,7 +254,7 @@ def _find_stabilising_zeros(base: WeightedDesign) -> tuple[str, ...]:
     )
 
 
-def _weight_given_design(design: Given, parameters: Numbers | None, weights: Numbers | None) -> WeightedDesign:
+def _weight_given_design(design: ProblemSource, parameters: Numbers | None, weights: Numbers | None) -> WeightedDesign:
     problem = pose(design)
     tables = {"parameters": (parameters, "{'Fr': 1.2, 'mu': 0.1}"), "weights": (weights, "{'lambda_s': 0.01}")}
     if faults := [f for n, (x, example) in tables.items() if x is not None for f in table_faults(n, x, example)]:

@@ -18,7 +18,7 @@ from tmsopt.deprecated import ignore_option
 from tmsopt.errors import InputError, call_faults, count_faults, input_error
 from tmsopt.executor import Crash, here, processes
 from tmsopt.files import as_path
-from tmsopt.problem.files import Given
+from tmsopt.problem.files import ProblemSource
 from tmsopt.problem.problem import Problem
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable
@@ -176,7 +176,7 @@ class Chart(Printable):
 
 @ignore_option("engine")
 def chart(
-    problem: Given,
+    problem: ProblemSource,
     axes: Sequence[str] | None = None,
     *,
     folder: str | Path | None = None,

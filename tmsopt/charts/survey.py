@@ -13,7 +13,7 @@ from numpy.typing import DTypeLike, NDArray
 from tmsopt.errors import Fault, InputError, input_error, list_faults, short, suggest, table_faults
 from tmsopt.problem.advice.names import example_of
 from tmsopt.problem.evaluate import ArrayFunction, array_function, parse_all
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_NAMES
 from tmsopt.records import Array
@@ -176,7 +176,7 @@ def limits_of(problem: Posed) -> dict[str, Any]:
 
 
 def plan_survey(
-    problem: Given,
+    problem: ProblemSource,
     axes: Sequence[str] | None = None,
     points: Sequence[int] | None = None,
     layers: Sequence[str] = USUAL,

@@ -82,7 +82,7 @@ class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
         from tmsopt.problem import as_solvable
 
         scale = _parse_scale("--wheelbase", self.wheelbase, "m"), _parse_scale("--rear-mass", self.rear_mass, "kg")
-        problem = as_solvable(self.file, front=True)
+        problem = as_solvable(self.file, allows_front=True)
         is_scaled = problem.model.name == "tms" and problem.parameter_set.rate is None
         self.refuse_useless(
             (not self.all, "seconds", "is for the proof of --all; write --all too, or leave it out"),

@@ -9,7 +9,7 @@ from typing import Any
 
 from tmsopt.documents.blocks import ALL_DIGITS, Cell, Row, TableBlock
 from tmsopt.dynamics.speeds import speed_of
-from tmsopt.evaluation.recheck import FEASIBLE
+from tmsopt.evaluation.recheck import FEASIBILITY_TOLERANCE
 from tmsopt.guide import describe
 from tmsopt.models import GRAVITY, INERTIAS, Parameter, Quantity, Values, to_si
 from tmsopt.models.user_spectrum import eigenfrequencies, roots_on_axis
@@ -91,7 +91,7 @@ def list_quantities(solution: Solution, si: Numbers) -> Iterator[Row]:
             continue
         cell = Cell(x, unit_of(problem, q.name))
         if q.share:
-            cell = Cell(x if abs(x) > FEASIBLE else 0.0, PERCENT, 6)
+            cell = Cell(x if abs(x) > FEASIBILITY_TOLERANCE else 0.0, PERCENT, 6)
         twin = q.counterpart
         counterpart = "" if twin is None or values is None else _describe_twin(twin, float(twin.value(values)))
         yield q.name, cell, cell.unit.text, counterpart, q.meaning
@@ -151,7 +151,7 @@ def describe_loads(solution: Solution) -> str:
     quantities, problem = solution.quantities, solution.problem.posed
     parts = []
     for wheel, share, load in (("front", "load_front", "N_F"), ("rear", "load_rear", "N_R")):
-        is_lifted = abs(quantities[share]) <= FEASIBLE
+        is_lifted = abs(quantities[share]) <= FEASIBILITY_TOLERANCE
         percent = f"{0.0 if is_lifted else 100 * quantities[share]:.4g} %"
         if math.isfinite(newtons := quantities.get(load, math.nan)):
             percent = f"{unit_of(problem, load).show(0.0 if is_lifted else newtons, 4)} ({percent})"
@@ -169,7 +169,7 @@ def describe_pitching(solution: Solution) -> str:
     in_case = " in the worst case" if cases else ""
     for wheel, pivot in (("rear", "front"), ("front", "rear")):
         load = min(float(case[f"load_{wheel}"]) for case in case_values)
-        if abs(load) <= FEASIBLE:  # the tolerance of an active limit chi_T <= 1
+        if abs(load) <= FEASIBILITY_TOLERANCE:  # the tolerance of an active limit chi_T <= 1
             return f"on the verge of pitching over the {pivot} wheel{in_case}; the {wheel} wheel carries no load"
         if load < 0:
             return f"pitches over the {pivot} wheel{in_case}{_describe_ballast(solution, case_values, wheel)}"
@@ -202,8 +202,10 @@ def describe_roots(solution: Solution, digits: int) -> tuple[str, str]:
         problem = solution.problem.posed
         unit = unit_at(problem, "abscissa", parameters_of_worst_case(solution))
         unit_text = f"  in {unit.text}" if unit.text else ""
-        unit_text += f"; √(g/w) = {1 / unit.one:.{digits}g} {unit.text}" if unit != unit_of(problem, "abscissa") else ""
-        return "roots", (", ".join(format_roots(solution.roots, digits, 1 / unit.one)) or "none") + unit_text
+        unit_text += (
+            f"; √(g/w) = {1 / unit.factor:.{digits}g} {unit.text}" if unit != unit_of(problem, "abscissa") else ""
+        )
+        return "roots", (", ".join(format_roots(solution.roots, digits, 1 / unit.factor)) or "none") + unit_text
     omegas, threshold = solution.eigenfrequencies, ZERO_SHARE * abs(solution.problem.model.carrier)
     middle = sum(z.re for z in omegas) / len(omegas) if omegas else 0.0
     spread = max((math.hypot(z.re - middle, z.im) for z in omegas), default=0.0) or 1.0

@@ -75,7 +75,7 @@ def _list_front(front: "Front") -> Iterator[NamedDesign]:
 
 def _scale_abscissa(problem: Posed, design: "Solution | Row") -> float:
     """Return the abscissa in 1/s, or without a unit if the model has none; more negative is faster decay."""
-    return design.abscissa / unit_at(problem, "abscissa", design.parameters).one
+    return design.abscissa / unit_at(problem, "abscissa", design.parameters).factor
 
 
 def _list_trace(trace: "Trace") -> Iterator[NamedDesign]:

@@ -15,7 +15,7 @@ from tmsopt.dynamics.system import is_bicycle
 from tmsopt.errors import InputError, input_error, is_number, short, suggest
 from tmsopt.models import Parameter, ParameterSet, Values
 from tmsopt.models.user_spectrum import user_root_array
-from tmsopt.problem.files import Given
+from tmsopt.problem.files import ProblemSource
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
@@ -94,7 +94,7 @@ class Growth(Tabular):
 
 
 def growth(
-    design: Given, end: float | None = None, over: str | None = None, *, progress: Listener | None = None
+    design: ProblemSource, end: float | None = None, over: str | None = None, *, progress: Listener | None = None
 ) -> Growth:
     """Roots over one parameter; all other parameters are those of the design.
 

@@ -18,7 +18,7 @@ from tmsopt.dynamics.system import ANGLES, RATES, System, matrices_of, system_of
 from tmsopt.errors import InputError, input_error
 from tmsopt.files import write_csv
 from tmsopt.models.user_spectrum import user_structure
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Column, Table, Tabular, plain
@@ -113,7 +113,7 @@ class Simulation(Tabular):
 
 
 def simulate(
-    design: Given,
+    design: ProblemSource,
     *,
     lean: float | str | None = None,
     steer: float | str | None = None,

@@ -15,7 +15,7 @@ from tmsopt.boundaries.weighted_design import parameter_faults
 from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, find_crossings, user_crossings
 from tmsopt.errors import InputError, input_error, short, suggest
 from tmsopt.models import ParameterSet
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
@@ -97,11 +97,11 @@ class Speeds(Tabular):
 
 
 def speeds(
-    design: Given | Mapping[str, float],
+    design: ProblemSource | Mapping[str, float],
     parameter: str | None = None,
     *,
     between: Stretch | None = None,
-    problem: Given | None = None,
+    problem: ProblemSource | None = None,
     progress: Listener | None = None,
 ) -> Speeds:
     """Every weave and capsize speed of a design, and every speed at which roots meet, by exact root isolation.

@@ -32,28 +32,30 @@ from tmsopt.problem.solution import Bound
 from tmsopt.program.nlp import objective_size
 from tmsopt.records import Array
 
-PROVEN = 1e-9
+PROOF_TOLERANCE = 1e-9
 """A design is proven optimal if its gap is below this share of the size of the roots plus the size of the bound."""
 
-ROUNDING = 1e-15  # relative rounding error of the quotient and of its root
+ROUNDING = 1e-15  # relative rounding error of the quotient aₙ/a0 and of its n-th root
 _BITS = 212  # working precision: 64 digits for parameters that are exact doubles
-_MAX_FREE = 12  # most free parameters, whose box has 4096 corners
+_MAX_FREE_COUNT = 12  # greatest number of free parameters; their box has 4096 corners
 
 _EXTRA_DESIGNS = 8  # designs that check a relation, in addition to those that determine it
 _GRID_STEPS = 2**40  # steps of a range, from which random exact designs are chosen
 
-_RATIONAL = {INPUT, CONSTANT, "add", "sub", "neg", "mul", "square", "div", "quotient", "ratio"}
+_RATIONAL_OPERATIONS = {INPUT, CONSTANT, "add", "sub", "neg", "mul", "square", "div", "quotient", "ratio"}
 """Operations of rational functions; integer powers are also allowed."""
 
-ExactEnds = Mapping[tuple[str, float], Any]
+_ExactEnds = Mapping[tuple[str, float], Any]
+"""(parameter, end of its range as a double) → interval of the exact end."""
 
 
 def minimizes_abscissa(problem: Posed) -> bool:
+    """Whether the abscissa is the objective to minimise."""
     return problem.sense == "minimize" and problem.goal == "abscissa"
 
 
 def instant_bound(problem: Posed, value: float) -> Bound:
-    """The bound by ω0, or the bound by relations of the coefficients if ω0 leaves a gap and they are better."""
+    """The bound by ω0; if ω0 leaves a gap, the bound by relations of the coefficients if it is better."""
     product_bound = omega0_bound(problem, value)
     if product_bound.proven or not minimizes_abscissa(problem):
         return product_bound
@@ -64,9 +66,9 @@ def instant_bound(problem: Posed, value: float) -> Bound:
 
 
 def omega0_bound(problem: Posed, value: float) -> Bound:
-    """Lower bound ω0 on the abscissa over the box, without constraints, and the gap of a value to it.
+    """Lower bound ω0 on the abscissa over the box, without constraints, and the gap between a value and this bound.
 
-    With scenarios, it is the bound of the first scenario, because the worst case is never better than this.
+    With scenarios, it is the bound of the first scenario, because the worst case is never better than this case.
     """
     largest = _bound_product(_select_first_case(problem)) if minimizes_abscissa(problem) else math.inf
     return _compare_with_bound(
@@ -83,7 +85,7 @@ def _select_first_case(problem: Posed) -> Posed:
 
 def _compare_with_bound(bound: float, value: float, method: str, size: float) -> Bound:
     """A bound and its gap; an empty bound if it is infinite or a feasible design contradicts it."""
-    if not math.isfinite(bound) or value < bound - PROVEN * (size + abs(bound)):
+    if not math.isfinite(bound) or value < bound - PROOF_TOLERANCE * (size + abs(bound)):
         return Bound()
     gap = max(value - bound, 0.0)
     return Bound(bound, gap, is_gap_closed(gap, bound, size), method)
@@ -91,7 +93,7 @@ def _compare_with_bound(bound: float, value: float, method: str, size: float) ->
 
 def is_gap_closed(gap: float, bound: float, size: float = 1.0) -> bool:
     """Whether a gap is closed, for roots of this size."""
-    return gap <= PROVEN * (size + abs(bound))
+    return gap <= PROOF_TOLERANCE * (size + abs(bound))
 
 
 def _bound_product(problem: Posed) -> float:
@@ -101,23 +103,23 @@ def _bound_product(problem: Posed) -> float:
     one parameter may be nonlinear; the stationary points along it are roots of a polynomial.
     """
     model = problem.model
-    if len(problem.free) > _MAX_FREE or not is_rational(model, model.sets[0]):
+    if len(problem.free) > _MAX_FREE_COUNT or not is_rational(model, model.sets[0]):
         return _enclose_product(problem)
     box, exact_ends = _build_algebraic_box(problem)
     outer = _trace_outer_coefficients(model, tuple(box))
     shares = np.random.default_rng(0).random(len(box)).tolist()  # a generic point, where no power vanishes
     inner_point = [lo + (hi - lo) * share for (lo, hi), share in zip(box.values(), shares, strict=True)]
     try:
-        through = {n: _restrict_to_line(outer, inner_point, n) for n, (lo, hi) in box.items() if lo < hi}
-    except (DomainError, TypeError):  # division by a parameter, or by 0 for the fixed ones
+        lines = {n: _restrict_to_line(outer, inner_point, n) for n, (lo, hi) in box.items() if lo < hi}
+    except (DomainError, TypeError):  # division by a parameter, or by 0 for the fixed parameters
         return _enclose_product(problem)
-    varying = {n: max(a.degree() for a in ends) for n, (*ends, turning) in through.items() if turning}
-    curved = [n for n, degree in varying.items() if degree > 1]
-    if len(curved) > 1:
+    degrees = {n: max(a0.degree(), an.degree()) for n, (a0, an, slope) in lines.items() if slope}
+    nonlinear_names = [n for n, degree in degrees.items() if degree > 1]
+    if len(nonlinear_names) > 1:
         return _enclose_product(problem)
-    at = [ends if varying.get(n) == 1 else (sum(ends) / 2,) for n, ends in box.items()]
-    points = [*itertools.product(*at)]
-    for name in curved:
+    coordinates = [ends if degrees.get(n) == 1 else (sum(ends) / 2,) for n, ends in box.items()]
+    points = [*itertools.product(*coordinates)]
+    for name in nonlinear_names:
         extremes = [_find_extremes(outer, corner, name, *box[name]) for corner in points]
         if not all(extremes):
             return math.inf
@@ -145,46 +147,46 @@ def _bound_ratio(a: Sequence[Any]) -> float:
     return float(upper) if upper.is_finite() else math.inf
 
 
-def _find_largest_ratio(outer: Formula, points: Mapping[str, Array], exact_ends: ExactEnds) -> float:
-    """Greatest |aₙ/a0| over the points; inf unless a0 has one sign at all of them.
+def _find_largest_ratio(outer: Formula, points: Mapping[str, Array], exact_ends: _ExactEnds) -> float:
+    """Greatest |aₙ/a0| over the points; inf unless a0 has the same sign at all points.
 
     Where both coefficients are 0, the quotient is constant along the adjacent edges. The largest quotients are computed
     again in interval arithmetic, because in doubles a small a0 loses digits by cancellation.
     """
-    first, last, *_ = np.broadcast_arrays(*values(outer, points), *points.values())
-    are_zero = (last == 0) & (first == 0)
-    if set(np.sign(first[~are_zero]).tolist()) not in ({-1.0}, {1.0}):
+    a0, an, *_ = np.broadcast_arrays(*values(outer, points), *points.values())
+    are_zero = (an == 0) & (a0 == 0)
+    if set(np.sign(a0[~are_zero]).tolist()) not in ({-1.0}, {1.0}):
         return math.inf
     with np.errstate(over="ignore"):
-        quotients = np.where(are_zero, 0.0, np.abs(last / np.where(are_zero, 1.0, first)))
+        quotients = np.where(are_zero, 0.0, np.abs(an / np.where(are_zero, 1.0, a0)))
     with flint.ctx.workprec(_BITS):
         for k in np.flatnonzero(quotients >= quotients.max() / 2):
-            at = {n: float(column[k]) for n, column in points.items()}
-            quotients[k] = _bound_ratio(values(outer, {n: exact_ends.get((n, x), exact(x)) for n, x in at.items()}))
+            point = {n: float(column[k]) for n, column in points.items()}
+            quotients[k] = _bound_ratio(values(outer, {n: exact_ends.get((n, x), exact(x)) for n, x in point.items()}))
     return float(quotients.max())
 
 
 def _restrict_to_line(outer: Formula, point: Sequence[float], name: str) -> tuple[Any, Any, Any]:
     """a0, aₙ and the numerator of (aₙ/a0)′ as polynomials in one parameter; the others are fixed at a point."""
-    at = dict(zip(outer.names, map(exact, point), strict=True)) | {name: flint.fmpq_poly([0, 1])}
-    first, last = (flint.fmpq_poly([1]) * a for a in fold(outer, at, BALLS))
-    return first, last, last.derivative() * first - last * first.derivative()
+    arguments = dict(zip(outer.names, map(exact, point), strict=True)) | {name: flint.fmpq_poly([0, 1])}
+    a0, an = (flint.fmpq_poly([1]) * a for a in fold(outer, arguments, BALLS))
+    return a0, an, an.derivative() * a0 - an * a0.derivative()
 
 
 def _find_extremes(outer: Formula, corner: Sequence[float], name: str, *ends: float) -> list[tuple[float, ...]]:
     """The ends and stationary points along the nonlinear parameter from a corner; empty if the line has a pole."""
-    first, _, turning = _restrict_to_line(outer, corner, name)
+    a0, _, slope = _restrict_to_line(outer, corner, name)
     poles, turning_points = (
         [z.real for z, _ in p.complex_roots() if z.imag == 0 and not (z.real < ends[0] or z.real > ends[1])]
-        for p in (first, turning)
+        for p in (a0, slope)
     )
     if poles:
         return []
-    places = (*ends, *(min(max(float(x), ends[0]), ends[1]) for x in turning_points))
-    return [tuple(x if n == name else c for n, c in zip(outer.names, corner, strict=True)) for x in places]
+    extremes = (*ends, *(min(max(float(x), ends[0]), ends[1]) for x in turning_points))
+    return [tuple(x if n == name else c for n, c in zip(outer.names, corner, strict=True)) for x in extremes]
 
 
-def _build_algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]], ExactEnds]:
+def _build_algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]], _ExactEnds]:
     """Range of each algebraic parameter in doubles, and the exact intervals of its ends.
 
     Algebraic parameters are monotone in each parameter of a set, so the corners of the box are enough. √(1 + T²) is
@@ -197,7 +199,7 @@ def _build_algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]]
     doubles = problem.model.algebraic(parameter_set.native(dict(zip(parameter_set.names, corners.T, strict=True))))
 
     @cache
-    def balls(k: int) -> dict[str, Any]:
+    def exact_corner(k: int) -> dict[str, Any]:
         with flint.ctx.workprec(_BITS):
             return problem.model.algebraic(
                 parameter_set.native(dict(zip(parameter_set.names, map(exact, corners[k].tolist()), strict=True)))
@@ -206,9 +208,9 @@ def _build_algebraic_box(problem: Posed) -> tuple[dict[str, tuple[float, float]]
     box, exact_ends = {}, dict[tuple[str, float], Any]()
     for n, corner_values in doubles.items():
         column = np.broadcast_to(np.asarray(corner_values, dtype=float), len(corners))
-        least, greatest = int(column.argmin()), int(column.argmax())
-        box[n] = float(column[least]), float(column[greatest])
-        exact_ends |= {(n, box[n][0]): balls(least)[n], (n, box[n][1]): balls(greatest)[n]}
+        indices = int(column.argmin()), int(column.argmax())
+        box[n] = float(column[indices[0]]), float(column[indices[1]])
+        exact_ends |= {(n, end): exact_corner(k)[n] for end, k in zip(box[n], indices, strict=True)}
     return box, exact_ends
 
 
@@ -223,15 +225,15 @@ def relation_bound(problem: Posed) -> float:
     rows = _sample_exact_rows(problem) if is_rational(problem.model, problem.parameter_set) else None
     if not rows:
         return -math.inf
-    # Independent b with Σ b_k a_k = 0, reduced from the leading coefficient on and from the last one.
-    reduced = [*_compute_null_space(rows), *(b[::-1] for b in _compute_null_space([row[::-1] for row in rows]))]
+    # Two bases of the relations Σ b_k a_k = 0, reduced from the leading and from the last coefficient.
+    relations = [*_compute_null_space(rows), *(b[::-1] for b in _compute_null_space([row[::-1] for row in rows]))]
     with flint.ctx.workprec(_BITS):
-        return max(map(_bound_by_relation, reduced), default=-math.inf)
+        return max(map(_bound_by_relation, relations), default=-math.inf)
 
 
 @lru_cache(maxsize=64)
 def is_rational(model: Model, parameter_set: ParameterSet) -> bool:
-    """Whether the coefficients are rational functions of the parameters, or of tangents of those that are angles."""
+    """Whether the coefficients are rational functions of the parameters (for angles, of their tangents)."""
     tangents = {p.name for p in parameter_set.parameters if p.tangent}
     coefficients = trace(
         lambda x: model.coefficients(
@@ -239,20 +241,22 @@ def is_rational(model: Model, parameter_set: ParameterSet) -> bool:
         ),
         parameter_set.names,
     )
-    wholes = {k for k, s in enumerate(coefficients.steps) if isinstance(s.value, Fraction) and s.value.denominator == 1}
-    powers = [s for s in coefficients.steps if s.op == "pow" and s.operands[1] in wholes]
-    rational = [s for s in coefficients.steps if s.op in _RATIONAL and not isinstance(s.value, Formula)]
+    integers = {
+        k for k, s in enumerate(coefficients.steps) if isinstance(s.value, Fraction) and s.value.denominator == 1
+    }
+    powers = [s for s in coefficients.steps if s.op == "pow" and s.operands[1] in integers]
+    rational = [s for s in coefficients.steps if s.op in _RATIONAL_OPERATIONS and not isinstance(s.value, Formula)]
     return len(powers) + len(rational) == len(coefficients.steps)
 
 
 def _compute_null_space(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
     """Reduced basis of the null space of the rows."""
     reduced, rank = flint.fmpq_mat([list(row) for row in rows]).rref()
-    width = range(len(rows[0]))
-    pivots = {next(j for j in width if reduced[i, j] != 0): i for i in range(rank)}
+    columns = range(len(rows[0]))
+    pivots = {next(j for j in columns if reduced[i, j] != 0): i for i in range(rank)}
     return [
-        [-reduced[pivots[j], free] if j in pivots else flint.fmpq(j == free) for j in width]
-        for free in width
+        [-reduced[pivots[j], free] if j in pivots else flint.fmpq(j == free) for j in columns]
+        for free in columns
         if free not in pivots
     ]
 
@@ -278,8 +282,8 @@ def _sample_exact_rows(problem: Posed) -> list[list[Any]] | None:
         design: dict[str, Any] = {}
         for n, ends in problem.ordered({**{n: (v, v) for n, v in problem.fixed.items()}, **problem.free}).items():
             lower, upper = (exact(math.tan(e)) if parameter_set[n].tangent else exact(e) for e in ends)
-            at = lower + (upper - lower) * flint.fmpq(int(rng.integers(_GRID_STEPS)), _GRID_STEPS)
-            design[n] = Tilt(at) if parameter_set[n].tangent else at
+            value = lower + (upper - lower) * flint.fmpq(int(rng.integers(_GRID_STEPS)), _GRID_STEPS)
+            design[n] = Tilt(value) if parameter_set[n].tangent else value
         row = problem.model.coefficients(design, parameter_set)
         if not all(isinstance(c, flint.fmpq) for c in row):
             return None

@@ -1,7 +1,7 @@
 """Computes correctly rounded numbers of a design by interval arithmetic on the parameters as stored.
 
 The parameters are doubles, so they are exact binary numbers, and a case adds its offsets exactly. So every quantity is
-a definite real number. Its interval (a "ball" with a midpoint and a radius) is computed with more and more bits until
+a definite real number. Its interval (a *ball* with a midpoint and a radius) is computed with more and more bits until
 one double is certainly the nearest.
 """
 
@@ -21,7 +21,7 @@ from tmsopt.models.user_spectrum import user_roots
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import depends_on_case
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, SIMPLE
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, SIMPLE_STRUCTURES
 from tmsopt.problem.units import Reading, frequencies, readings
 from tmsopt.records import Numbers, Table
 from tmsopt.roots import Root, Structure
@@ -34,10 +34,12 @@ from tmsopt.roots.patterns.root_enclosures import (
 )
 
 _PRECISIONS = (212, 424, 848, 1696)
-"""Bits of precision, tried in this order. The first are 64 digits, of which a fit may lose half."""
+"""Bits of precision, tried in this order. 212 bits are 64 digits, half of which a fit may lose."""
 
-_Key = tuple[str, str]  # a field of `Certified`, and a name if it is a table
-_Several = tuple[EnclosedRoot, ...]
+_Key = tuple[str, str]
+"""A field of `Certified`, and a name in the field if the field is a table."""
+
+_Roots = tuple[EnclosedRoot, ...]
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Certified:
 
     value: float
     abscissa: float
-    realised: float
+    abscissa_realised: float
     roots: tuple[Root, ...]
     quantities: Table[float]
     dimensionless: Table[float]
@@ -58,8 +60,8 @@ def certified_numbers(
 ) -> Certified:
     """Round the numbers of a design correctly.
 
-    The recheck supplies the worst cases and the structure of the roots. If intervals cannot decide a number, for
-    example because it is exactly 0, it keeps the value of the recheck.
+    The recheck gives the worst cases and the structure of the roots. If intervals cannot decide how to round a number,
+    for example because it is exactly 0, the number keeps the value of the recheck.
 
     Args:
         cases: the cases of the recheck. If the objective depends on the case, it is the worst over these cases.
@@ -67,20 +69,23 @@ def certified_numbers(
     structures = {checked.worst: checked.structure}
     for case in {checked.least_damped, checked.fastest} - {checked.worst}:
         structures[case] = problem.values(case.applied(parameters))["structure"]
-    stated_cases = [case for case in cases if not case.direction]
-    design = _Design(problem, _convert_exactly(parameters), checked, stated_cases, structures)
-    default_numbers: dict[_Key, float] = {("value", ""): checked.objective, ("realised", ""): checked.realised}
-    default_numbers["abscissa", ""] = checked.structure.abscissa
+    listed_cases = [case for case in cases if not case.direction]
+    design = _Design(problem, _convert_exactly(parameters), checked, listed_cases, structures)
+    default_numbers: dict[_Key, float] = {
+        ("value", ""): checked.objective,
+        ("abscissa", ""): checked.structure.abscissa,
+        ("abscissa_realised", ""): checked.abscissa_realised,
+    }
     default_numbers |= {("quantities", name): x for name, x in checked.quantities.items()}
     default_numbers |= {("dimensionless", name): x for name, x in checked.dimensionless.items()}
     numbers: dict[_Key, Any] = {}
     for precision in _PRECISIONS:
         with flint.ctx.workprec(precision):
-            roots = design.roots(last=precision == _PRECISIONS[-1])
-            balls = [] if roots is None else [each for each in design.balls(*roots) if each[0] not in numbers]
+            roots = design.roots(is_last=precision == _PRECISIONS[-1])
+            balls = [] if roots is None else [entry for entry in design.balls(*roots) if entry[0] not in numbers]
             for key, ball, digits in balls:
                 number = _round_ball(ball, digits)
-                # Rounded parameters may be just outside the domain of a quantity, for example near Fr_c = 0.
+                # Rounded parameters may be slightly outside the domain of a quantity, for example near Fr_c = 0.
                 if number is not None and not (
                     math.isfinite(default_numbers.get(key, math.nan)) and math.isnan(number)
                 ):
@@ -94,7 +99,7 @@ def certified_numbers(
     return Certified(
         value=table("value")[""],
         abscissa=table("abscissa")[""],
-        realised=table("realised")[""],
+        abscissa_realised=table("abscissa_realised")[""],
         roots=numbers.get(("roots", "")) or user_roots(problem.model, checked.structure.roots),
         quantities=table("quantities"),
         dimensionless=table("dimensionless"),
@@ -108,8 +113,8 @@ def _round_ball(ball: Any, digits: int) -> Any:
         parts = tuple(_round_ball(part, digits) for part in ball)
         return None if None in parts else parts
     if isinstance(ball, EnclosedRoot):
-        place = _round_ball((ball.re, ball.im), digits)
-        return place and Root(place[0], place[1], ball.multiplicity)
+        parts = _round_ball((ball.re, ball.im), digits)
+        return parts and Root(parts[0], parts[1], ball.multiplicity)
     return nearest_decimal(ball, digits) if digits else nearest_double(ball)
 
 
@@ -118,7 +123,7 @@ class _Design:
     """A design with everything that its numbers depend on.
 
     Attributes:
-        exact: the exact parameters.
+        exact: the parameters as exact numbers.
         structures: case → structure of the roots, for the rightmost, least damped and fastest cases.
     """
 
@@ -128,7 +133,7 @@ class _Design:
     cases: Sequence[Case]
     structures: Mapping[Case, Structure]
 
-    def balls(self, stored: _Several, ideal: Mapping[Case, _Several]) -> Iterator[tuple[_Key, Any, int]]:
+    def balls(self, stored: _Roots, ideal: Mapping[Case, _Roots]) -> Iterator[tuple[_Key, Any, int]]:
         """Every number as a ball at the working precision, and its number of decimal digits; 0 means a double."""
         model, parameter_set, checked, known_values = (
             self.problem.model,
@@ -136,22 +141,24 @@ class _Design:
             self.checked,
             dict[str, Any](),
         )
-        worst, damped, fastest = (ideal[c] for c in (checked.worst, checked.least_damped, checked.fastest))
+        worst_roots, least_damped_roots, fastest_roots = (
+            ideal[case] for case in (checked.worst, checked.least_damped, checked.fastest)
+        )
         if stored:
-            yield ("realised", ""), _find_rightmost(stored), 0
-        if damped and model.carrier is None:
-            known_values["damping_ratio"] = reduce(lesser, map(_compute_damping_ratio, damped))
-        if fastest and ANGULAR_FREQUENCY in checked.quantities:
-            known_values[ANGULAR_FREQUENCY] = reduce(greater, (root.im for root in fastest))
-        if worst:
-            known_values["abscissa"] = _find_rightmost(worst)
+            yield ("abscissa_realised", ""), _find_rightmost(stored), 0
+        if least_damped_roots and model.carrier is None:
+            known_values["damping_ratio"] = reduce(lesser, map(_compute_damping_ratio, least_damped_roots))
+        if fastest_roots and ANGULAR_FREQUENCY in checked.quantities:
+            known_values[ANGULAR_FREQUENCY] = reduce(greater, (root.im for root in fastest_roots))
+        if worst_roots:
+            known_values["abscissa"] = _find_rightmost(worst_roots)
             yield ("abscissa", ""), known_values["abscissa"], 0
-            yield ("roots", ""), _to_user_roots(model, worst), 0
+            yield ("roots", ""), _to_user_roots(model, worst_roots), 0
         if checked.robustness and math.isfinite(checked.robustness.radius):
             known_values[RADIUS] = exact(checked.robustness.radius)
         nominal, abscissa, pi = self.values(Case()), known_values.get("abscissa", math.nan), flint.arb.pi()
         if parameter_set.rate is not None:
-            rates = frequencies(fastest, parameter_set.rate(self.exact), pi)
+            rates = frequencies(fastest_roots, parameter_set.rate(self.exact), pi)
             nominal = nominal.with_known({"frequency": reduce(greater, rates, flint.arb(0))})
         nominal = nominal.with_known({"abscissa": abscissa, **known_values})
         yield from (
@@ -159,7 +166,8 @@ class _Design:
         )
         native = parameter_set.native(self.exact)
         yield from ((("dimensionless", n), native[n], 0) for n in checked.dimensionless)
-        yield from ((("si", n), x, k) for n, x, k in readings(parameter_set, self.exact, nominal, abscissa, worst, pi))
+        for name, x, digits in readings(parameter_set, self.exact, nominal, abscissa, worst_roots, pi):
+            yield ("si", name), x, digits
         objective = self.problem.objective
         if objective is not None and set(objective.names) & {*ROOT_NAMES} <= set(known_values):
             differs = depends_on_case(self.problem, objective, self.cases)
@@ -167,37 +175,41 @@ class _Design:
             objectives = [objective.of(self.values(case).with_known(known_values), BALLS) for case in cases]
             yield ("value", ""), reduce(lesser if self.problem.sense == "maximize" else greater, objectives), 0
 
-    def roots(self, last: bool) -> tuple[_Several, Mapping[Case, _Several]] | None:
+    def roots(self, is_last: bool) -> tuple[_Roots, Mapping[Case, _Roots]] | None:
         """The stored roots in the worst case, and for each case the roots of the nearest polynomial of its structure.
 
-        Roots that are undecided at the `last` precision are the roots of the recheck; before it, the result is None.
+        If roots remain undecided, the result is None, or at the last precision the roots of the recheck.
         """
         stored = enclosed_roots(self.values(self.checked.worst).coefficients)
-        ideal: dict[Case, _Several] = {}
+        ideal: dict[Case, _Roots] = {}
         for case, structure in self.structures.items():
             coefficients = self.values(case).coefficients
-            nearest: _Several | None = ()  # for a root at infinity
-            if structure.roots and structure.name in SIMPLE and all(root.multiplicity == 1 for root in structure.roots):
+            nearest: _Roots | None = ()  # for a root at infinity
+            if (
+                structure.roots
+                and structure.name in SIMPLE_STRUCTURES
+                and all(root.multiplicity == 1 for root in structure.roots)
+            ):
                 nearest = (stored if case == self.checked.worst else None) or enclosed_roots(coefficients)
             elif structure.roots:
                 nearest = nearest_roots(coefficients, structure.roots)
-            if (nearest is None or stored is None) and not last:
+            if (nearest is None or stored is None) and not is_last:
                 return None
-            as_found = (EnclosedRoot(flint.arb(r.re), flint.arb(r.im), r.multiplicity) for r in structure.roots)
-            ideal[case] = tuple(as_found) if nearest is None else nearest
+            checked_roots = (EnclosedRoot(flint.arb(r.re), flint.arb(r.im), r.multiplicity) for r in structure.roots)
+            ideal[case] = tuple(checked_roots) if nearest is None else nearest
         return stored or (), ideal
 
     def values(self, case: Case) -> Values:
         """Everything derived from the exact parameters in a case, without root quantities."""
-        varied = Case(Table(_convert_exactly(case.at)), Table(_convert_exactly(case.offset))).applied(self.exact)
-        return Values(self.problem.model, self.problem.parameter_set, varied)
+        exact_case = Case(Table(_convert_exactly(case.at)), Table(_convert_exactly(case.offset)))
+        return Values(self.problem.model, self.problem.parameter_set, exact_case.applied(self.exact))
 
 
 def _convert_exactly(table: Numbers) -> dict[str, Any]:
     return {name: exact(value) for name, value in table.items()}
 
 
-def _find_rightmost(roots: _Several) -> Any:
+def _find_rightmost(roots: _Roots) -> Any:
     return reduce(greater, (root.re for root in roots))
 
 
@@ -206,10 +218,10 @@ def _compute_damping_ratio(root: EnclosedRoot) -> Any:
     return flint.arb(0) if root.re == 0 and root.im == 0 else -root.re / root.modulus
 
 
-def _to_user_roots(model: Model, roots: _Several) -> _Several:
-    """The roots as the user sees them; a difference of at most 2⁻²¹² to the carrier counts as 0."""
-    user: _Several = user_roots(model, roots)
+def _to_user_roots(model: Model, roots: _Roots) -> _Roots:
+    """The roots as users see them, with the carrier of a complex H; an imaginary part of at most 2⁻²¹² counts as 0."""
+    converted: _Roots = user_roots(model, roots)
     if model.carrier is None:
-        return user
-    nothing = flint.arb(2) ** -_PRECISIONS[0] * (1 + abs(model.carrier))
-    return tuple(replace(z, im=flint.arb(0)) if z.im.contains(0) and abs(z.im) < nothing else z for z in user)
+        return converted
+    tolerance = flint.arb(2) ** -_PRECISIONS[0] * (1 + abs(model.carrier))
+    return tuple(replace(z, im=flint.arb(0)) if z.im.contains(0) and abs(z.im) < tolerance else z for z in converted)

@@ -15,7 +15,7 @@ from tmsopt.explorer.designs import PageDesign, list_designs
 from tmsopt.explorer.javascript import kernel_script, model_script
 from tmsopt.explorer.page_data import make_page_data
 from tmsopt.files import as_path, write_text
-from tmsopt.problem import Given, Posed, Problem, Solution, pose
+from tmsopt.problem import Posed, Problem, ProblemSource, Solution, pose
 from tmsopt.problem.toml import read_page
 from tmsopt.program.options import CommonOptions
 from tmsopt.progress import start_steps
@@ -73,7 +73,7 @@ class Explorer:
         return frame(self.html, self.problem.title)
 
 
-def explore(problem: Given, **options: Unpack[CommonOptions]) -> Explorer:
+def explore(problem: ProblemSource, **options: Unpack[CommonOptions]) -> Explorer:
     """Make the page of a problem, which is solved if it has an objective; a solution is not solved again.
 
     The page shows one design at a time, at the nominal values of bands and tolerances. For a front, the first objective

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from tmsopt.analysis import structure_line
-from tmsopt.evaluation.recheck import FEASIBLE
+from tmsopt.evaluation.recheck import FEASIBILITY_TOLERANCE
 from tmsopt.explorer.designs import PageDesign
 from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.guide import exact_value, toml_key, toml_text
 from tmsopt.models import Parameter, words_of
 from tmsopt.models.user_spectrum import ON_AXIS, eigenfrequencies
 from tmsopt.problem import Posed, degrees_of_freedom, limit_value, unit_of
-from tmsopt.problem.validate import SMALLEST
+from tmsopt.problem.validate import MIN_SIZE
 from tmsopt.records import Array
 from tmsopt.tracing import domain, trace
 
@@ -59,7 +59,7 @@ def make_page_data(
         "rootUnit": unit_of(problem, "abscissa").text,
         "carrier": problem.model.carrier,
         "onAxis": ON_AXIS,
-        "smallest": SMALLEST,
+        "smallest": MIN_SIZE,
         "parameters": [_describe_parameter(problem, p, start[p.name]) for p in parameter_set.parameters],
         "quantities": [
             {"name": q.name, "meaning": q.meaning, "share": q.share, **_describe_unit(problem, q.name)}
@@ -85,7 +85,7 @@ def _compute_middle(problem: Posed) -> dict[str, float]:
 
 def _describe_unit(problem: Posed, name: str) -> dict[str, Any]:
     unit = unit_of(problem, name)
-    return {"unit": unit.text, "one": unit.one}
+    return {"unit": unit.text, "one": unit.factor}
 
 
 def _describe_parameter(problem: Posed, parameter: Parameter, value: float) -> dict[str, Any]:
@@ -126,7 +126,7 @@ def _describe_constraint(problem: Posed, name: str) -> dict[str, Any]:
         "text": problem.constraints[name],
         **_describe_unit(problem, name),
         "equality": condition.equality,
-        "tolerance": FEASIBLE * size,
+        "tolerance": FEASIBILITY_TOLERANCE * size,
     }
 
 

@@ -21,7 +21,7 @@ from tmsopt.fronts.subproblems import (
     solve_end,
 )
 from tmsopt.fronts.surface import fill_surface
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.verdict.status import NotSolved
 from tmsopt.program.options import CommonOptions, Options, documents_options, make_options
@@ -37,7 +37,7 @@ _NO_CONFLICT = 1e-7  # objectives do not conflict if their relative difference b
 
 @documents_options(CommonOptions, _DEFAULTS)
 def pareto(
-    problem: Given, points: int = POINTS, *, workers: int | None = None, **options: Unpack[CommonOptions]
+    problem: ProblemSource, points: int = POINTS, *, workers: int | None = None, **options: Unpack[CommonOptions]
 ) -> Front:
     """Compute the Pareto front of two or three objectives, each minimised, with its ends, kinks and gaps.
 
@@ -73,7 +73,7 @@ def pareto(
     if not problem.pareto:
         message = 'no front is asked for; add e.g. pareto = ["abscissa", "Fr"], or call tmsopt.solve'
         raise input_error(message, "objective")
-    choices = make_options(options, defaults=_DEFAULTS, fewest=0)
+    choices = make_options(options, defaults=_DEFAULTS, min_starts=0)
     faults = count_faults("points", points, 2, MOST_POINTS)
     if faults := faults + ([] if workers is None else count_faults("workers", workers, 1)):
         raise InputError(faults)

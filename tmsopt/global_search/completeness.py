@@ -233,7 +233,7 @@ def _enumerate_systems(problem: Posed) -> Iterator[PatternSystem]:
     lifted = lifted_quantities(problem.model, problem.parameter_set, problem.ordered(middle), equalities)
     frame, scale = find_rotating_frame(problem), scale_of(problem)
     for pieces in enumerate_pieces(problem.pattern.form, is_complex=frame is not None):
-        yield build_system(problem, pieces, frame or Scale(_UNIT_FACTOR * scale.unit, scale.lead), lifted)
+        yield build_system(problem, pieces, frame or Scale(_UNIT_FACTOR * scale.unit, scale.a0_unit), lifted)
 
 
 def _build_conditions(system: PatternSystem) -> tuple[BoxConditions, Box]:

@@ -251,8 +251,8 @@ def build_system(
         *_, parameters = values.given
         a = _complex_coefficients(problem, parameters, scale)
     else:
-        lead, unit = Fraction(scale.lead), Fraction(scale.unit)
-        a = [c / (lead * unit**k) for k, c in enumerate(values.coefficients)]
+        a0_unit, unit = Fraction(scale.a0_unit), Fraction(scale.unit)
+        a = [c / (a0_unit * unit**k) for k, c in enumerate(values.coefficients)]
     equalities = [c for c in problem.conditions.values() if c.equality]
     nonnegative = [x for piece in pieces for x in piece.nonnegative(pattern_unknowns)]
     interchangeable = [

@@ -66,7 +66,7 @@ class Question:
         build.objective = sign * compact_coefficients(self.problem.model, build.values[first_case])[0]
         if build.enclose([build.objective])[0][0] > 0:
             return None
-        build.add_constraints(without=self.problem.asked_of_roots)
+        build.add_constraints(excluded=self.problem.asked_of_roots)
         return build.finish("leading")
 
     def program(self, sign: int, least_lead: float = 0.0) -> NLP:

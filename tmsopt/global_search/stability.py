@@ -100,7 +100,7 @@ def _judge_point(problem: Posed, design: Mapping[str, float] | None) -> Stabilit
     """Decide by a recheck whether a point that the solver found is stable."""
     if design is not None:
         evaluation = _recheck_point(problem, design)
-        if max(evaluation.structure.abscissa, evaluation.realised) < 0:
+        if max(evaluation.structure.abscissa, evaluation.abscissa_realised) < 0:
             return Stability(None if evaluation.violations else True, design)
     return Stability()
 

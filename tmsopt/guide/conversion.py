@@ -9,19 +9,19 @@ from tmsopt.errors import Fault, InputError, short, suggest
 from tmsopt.guide.problem_text import toml_problem
 from tmsopt.models import CONSTANTS, FUNCTIONS, controlled, whipple
 from tmsopt.problem import Posed, Problem
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.units import parse_quantity
 
 INERTIAS = ("boxes", "none")
 """What a point mass becomes: a solid box around its centre of mass, or again a point mass."""
 
-_PER_WHEELBASE = {"B": (1 / 2, 1 / 4, 3 / 8), "H": (1 / 8, 1 / 8, 3 / 8)}
+_BOX_PER_WHEELBASE = {"B": (1 / 2, 1 / 4, 3 / 8), "H": (1 / 8, 1 / 8, 3 / 8)}
 """Body → default length, width and height of its box, divided by the wheelbase."""
 
 _INERTIA_SHARE = 0.9
-"""Widens the range of an inertia that follows from a mass: its low end times this, its high end divided by it.
+"""Widens the range of an inertia that follows from a mass, so that the limits of the mass become active first.
 
-So the limits of the mass become active first.
+The low end of the range is multiplied by this number, and the high end is divided by it.
 """
 
 _COUNTERPARTS = {
@@ -49,7 +49,7 @@ Size = tuple[float, float, float]
 
 
 def convert(
-    given: Given,
+    given: ProblemSource,
     to: str = "whipple",
     inertia: str = "boxes",
     body: str | Size | None = None,
@@ -69,7 +69,7 @@ def convert(
         front: the same for the front assembly; by default 1/8, 1/8 and 3/8.
 
     Raises:
-        InputError: if something has no counterpart in the other model; the error names all of it.
+        InputError: listing everything that has no counterpart in the other model.
 
     Example:
         >>> robot = tmsopt.convert("problems/point_mass_robot.toml", body="40x20x30 cm")
@@ -92,14 +92,14 @@ def convert(
     limits = {name: _translate(problem, text) for name, text in problem.constraints.items()}
     for letter, (length, width, height) in sizes.items():
         mass = f"m_{letter}"
-        for axes, share in (("xx", (width**2 + height**2) / 12), ("zz", (length**2 + width**2) / 12)):  # m²
+        for axes, per_mass in (("xx", (width**2 + height**2) / 12), ("zz", (length**2 + width**2) / 12)):  # m²
             name = f"I_{letter}{axes}"
             if mass in problem.free:
                 low, high = problem.free[mass]
-                free[name] = (_round(_INERTIA_SHARE * share * low), _round(share * high / _INERTIA_SHARE))
-                limits[_choose_new_name(f"box_{name}", limits)] = f"{name} == {share:.12g}*{mass}"
+                free[name] = (_round(_INERTIA_SHARE * per_mass * low), _round(per_mass * high / _INERTIA_SHARE))
+                limits[_choose_new_name(f"box_{name}", limits)] = f"{name} == {per_mass:.12g}*{mass}"
             else:
-                fixed[name] = _round(share * problem.fixed[mass])
+                fixed[name] = _round(per_mass * problem.fixed[mass])
     return replace(
         problem.problem,
         model=whipple,
@@ -112,7 +112,7 @@ def convert(
     )
 
 
-def converted_file(given: Given, **options: Any) -> str:
+def converted_file(given: ProblemSource, **options: Any) -> str:
     """Write a converted problem file with comments on the assumptions; `options` are those of `convert`."""
     problem = pose(given)
     converted, sizes = convert(problem, **options), _choose_sizes(problem, **options)
@@ -148,7 +148,7 @@ def _list_unconvertible(problem: Posed, to: str, inertia: str) -> Iterator[Fault
 
 
 def _list_missing_counterparts(problem: Posed) -> Iterator[Fault]:
-    """List faults for names in the objective and the constraints that Whipple's model lacks."""
+    """List faults for names in the objective and the constraints that Whipple's model does not have."""
     objectives = {"minimize": problem.minimize, "maximize": problem.maximize, "pareto": " ".join(problem.pareto)}
     expressions = {("objective", sense): text or "" for sense, text in objectives.items()}
     expressions |= {("constraints", name): text for name, text in problem.constraints.items()}
@@ -169,12 +169,12 @@ def _find_counterparts(problem: Posed) -> dict[str, str]:
 
 
 def _translate(problem: Posed, text: str) -> str:
-    words = _find_counterparts(problem)
-    return _WORD.sub(lambda word: words[word[0]], text)
+    counterparts = _find_counterparts(problem)
+    return _WORD.sub(lambda word: counterparts[word[0]], text)
 
 
 def _translate_objective(problem: Posed, text: str | None) -> str | None:
-    """Translate an objective; the abscissa alone stays unchanged if g and w, and so its factor √(g/w), are constant."""
+    """Translate an objective; the objective ``abscissa`` stays unchanged if its factor √(g/w) is constant."""
     if text is None or (text.strip() == "abscissa" and not {"g", "w"} & {*problem.free, *problem.scenarios}):
         return text
     return _translate(problem, text)
@@ -191,7 +191,7 @@ def _choose_sizes(
     sizes, faults = {}, []
     for letter, option, size in (("B", "body", body), ("H", "front", front)) if inertia == "boxes" else ():
         if size is None:
-            length, width, height = (share * _find_middle(problem, "w") for share in _PER_WHEELBASE[letter])
+            length, width, height = (share * _find_middle(problem, "w") for share in _BOX_PER_WHEELBASE[letter])
             centre = f"z_{letter}"
             centre_height = -problem.free[centre][1] if centre in problem.free else -problem.fixed[centre]
             sizes[letter] = (_round(length), _round(width), _round(min(height, 2 * centre_height)))
@@ -223,6 +223,7 @@ def _parse_size(size: str | Size) -> Size:
 
 
 def _find_middle(problem: Posed, name: str) -> float:
+    """Return the middle of the range of a free parameter, or the value of a fixed parameter."""
     return sum(problem.free[name]) / 2 if name in problem.free else problem.fixed[name]
 
 

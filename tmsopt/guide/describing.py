@@ -12,16 +12,16 @@ from tmsopt.guide.description import Description, Word, Words
 from tmsopt.models import CONSTANTS, FUNCTIONS, MODELS, Model, Parameter, ParameterSet, Range
 from tmsopt.models.built_in import controlled, gain_names
 from tmsopt.models.user_spectrum import pattern_of, patterns_of
-from tmsopt.problem import Band, Given, Posed, Problem, Solution, Unit, load, pose, unit_of
+from tmsopt.problem import Band, Posed, Problem, ProblemSource, Solution, Unit, load, pose, unit_of
 from tmsopt.problem.advice.names import vocabulary
 from tmsopt.problem.toml import read_page
 from tmsopt.records import Table
 
-Typed = Mapping[str, Any]
+TypedTables = Mapping[str, Any]
 """The tables of a file as typed; empty if there is no file."""
 
 
-def describe(given: Given | Model) -> Description:
+def describe(given: ProblemSource | Model) -> Description:
     """Describe the names, units, signs and meanings of a model or its name, a problem, a solution, or a file.
 
     Raises:
@@ -44,31 +44,31 @@ def describe(given: Given | Model) -> Description:
         accepted = f"the name of a model ({', '.join(MODELS)}), the path of a file, a Model, a Problem, or a Solution"
         raise input_error(f"found {short(given)}; accepted: {accepted}", "given")
     try:
-        problem, typed = _read(given)
+        problem, tables = _read(given)
     except InputError as error:
         if "." in str(given) or len(error.faults) != 1:
             raise
         (fault,) = error.faults  # a word that is no file may be the misspelt name of a model
         message = f"{fault.message}; models: {' '.join(MODELS)}"
         raise InputError([replace(fault, message=message)]) from None
-    return _describe(problem.model, problem.posed, typed)
+    return _describe(problem.model, problem.posed, tables)
 
 
-def _read(path: str | PathLike[str]) -> tuple[Problem, Typed]:
+def _read(path: str | PathLike[str]) -> tuple[Problem, TypedTables]:
     """Read the problem of a problem file or study file, with its tables."""
     data = read_page(path, "problem").data
     if "parameters" in data or not {"problem", "study", "vary"} & set(data):
         return load(path), data
-    inner = data.get("problem")
-    if isinstance(inner, str):
-        return _read(Path(path).parent / inner)
-    from tmsopt.studies import load_study  # not needed for a solve, which describes its parameters
+    base = data.get("problem")
+    if isinstance(base, str):
+        return _read(Path(path).parent / base)
+    from tmsopt.studies import load_study  # imported here, because a solve describes parameters without studies
 
-    return load_study(path).problem, inner if isinstance(inner, dict) else {}
+    return load_study(path).problem, base if isinstance(base, dict) else {}
 
 
-def _describe(model: Model, problem: Posed | None = None, typed: Typed = Table()) -> Description:
-    model_table = typed.get("model")
+def _describe(model: Model, problem: Posed | None = None, tables: TypedTables = Table()) -> Description:
+    model_table = tables.get("model")
     model_table = model_table if isinstance(model_table, dict) else model.statement or {}
     return Description(
         model=model.name,
@@ -86,11 +86,11 @@ def _describe(model: Model, problem: Posed | None = None, typed: Typed = Table()
         conventions=model.conventions,
         sketch=model.sketch,
         matrices=Table(dict(_list_matrices(model_table))),
-        asked=Table(_list_question(problem, typed) if problem else {}),
+        asked=Table(_list_request(problem, tables) if problem else {}),
     )
 
 
-def _list_words(model: Model, parameter_set: ParameterSet, problem: Posed | None, model_table: Typed) -> Words:
+def _list_words(model: Model, parameter_set: ParameterSet, problem: Posed | None, model_table: TypedTables) -> Words:
     expressions = model_table.get("quantities", {})
     quantities = [s for n, s in vocabulary(model, parameter_set).items() if n not in parameter_set.names]
     return Words(
@@ -130,20 +130,20 @@ def _format_number(value: Any, unit: Unit) -> str:
     return value if isinstance(value, str) else unit.show(value, 12)
 
 
-def _list_matrices(model_table: Typed) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:
+def _list_matrices(model_table: TypedTables) -> Iterator[tuple[str, tuple[tuple[str, ...], ...]]]:
     for name, rows in model_table.items():
         if isinstance(rows, list) and name not in ("parameters", "shared"):
-            listed = rows if all(isinstance(row, list) for row in rows) else [rows]
-            yield name, tuple(tuple(map(str, row)) for row in listed)
+            matrix = rows if all(isinstance(row, list) for row in rows) else [rows]
+            yield name, tuple(tuple(map(str, row)) for row in matrix)
 
 
-def _list_question(problem: Posed, typed: Typed) -> dict[str, Table[str]]:
-    """List the question of a problem, section by section."""
+def _list_request(problem: Posed, tables: TypedTables) -> dict[str, Table[str]]:
+    """List what a problem asks for: section → key → text."""
     senses = {n: getattr(problem, n) or "" for n in ("locate", "minimize", "maximize")}
     objective = {"pareto": ", ".join(problem.pareto)} if problem.pareto else {n: t for n, t in senses.items() if t}
     sections: dict[str, dict[str, str]] = {"objective": objective, "constraints": dict(problem.constraints)}
     for section in ("scenarios", "tolerances", "weights"):
-        typed_values = typed.get(section, {})
+        typed_values = tables.get(section, {})
         sections[section] = {
             n: _format_span(typed_values.get(n, v), unit_of(problem, n)) for n, v in getattr(problem, section).items()
         }

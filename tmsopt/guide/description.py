@@ -41,7 +41,7 @@ class Words:
 
 @dataclass(frozen=True, repr=False)
 class Description(Printable):
-    """A model, or a problem, in names and their meanings.
+    """The names of a model or of a problem, with their meanings.
 
     Attributes:
         model: name of the model.
@@ -54,7 +54,7 @@ class Description(Printable):
         conventions: sentences on signs.
         sketch: side view of a bicycle; empty for other systems.
         matrices: M, D, K, A or coefficients of a user's system → rows of entries.
-        asked: section of a problem → key → text.
+        asked: what a problem asks for: section → key → text.
         feedback: what [feedback] adds to each parameter set of a bicycle.
 
     Example:

@@ -16,22 +16,22 @@ SCHEMA_FILE = "tmsopt.schema.json"
 
 _INSTALLED_FOLDER = "share/tmsopt/problems"  # the same as in pyproject.toml
 
-STARTS = {
+TEMPLATES = {
     "tms": "an engineer's bicycle or robot on two wheels, as two masses on skates, in SI units",
     "whipple": "a bicycle with wheels and trail, in SI units",
     "own": "a system of your own, by its matrices",
 }
-"""Model of a new problem → its meaning."""
+"""Model of a new problem → meaning of the model."""
 
 
 def new_problem(model: str = "tms") -> str:
     """Return a problem file to start from. It can be solved without changes.
 
     Raises:
-        InputError: unless `model` is one of `STARTS`.
+        InputError: unless `model` is one of `TEMPLATES`.
     """
-    if model not in STARTS:
-        raise input_error(f"found '{model}'; {suggest(model, STARTS)}", "model")
+    if model not in TEMPLATES:
+        raise input_error(f"found '{model}'; {suggest(model, TEMPLATES)}", "model")
     return (files("tmsopt.guide") / "templates" / f"{model}.toml").read_text(encoding="utf-8")
 
 
@@ -73,13 +73,13 @@ def schema_text() -> str:
 @cache
 def _find_files() -> Mapping[str, Path]:
     """Find the files of the examples, in the source repository or installed with the package."""
-    above = Path(__file__).parents[2]
-    checkout, installed_folder = above / "problems", above / _INSTALLED_FOLDER
-    folder = checkout if (checkout / SCHEMA_FILE).is_file() else installed_folder  # pip install --target
+    root = Path(__file__).parents[2]
+    folder = root / "problems"  # in the source repository
+    if not (folder / SCHEMA_FILE).is_file():
+        folder = root / _INSTALLED_FOLDER  # after pip install --target
     paths = [*folder.glob("*.toml")]
     if not paths:
-        listed = metadata.files("tmsopt") or []
-        paths = [
-            Path(str(f.locate())) for f in listed if str(f.parent).endswith(_INSTALLED_FOLDER) and f.suffix == ".toml"
-        ]
+        installed = metadata.files("tmsopt") or []
+        example_files = (f for f in installed if str(f.parent).endswith(_INSTALLED_FOLDER) and f.suffix == ".toml")
+        paths = [Path(str(f.locate())) for f in example_files]
     return {path.stem: path for path in sorted(paths)}

@@ -14,8 +14,8 @@ from tmsopt.problem.cases import middle_of
 from tmsopt.problem.units import parse_quantity, unit_factor
 from tmsopt.problem.units.text import parse_exact_quantity
 
-_LARGEST_DENOMINATOR = 10**6  # bound for factors between units, such as 5/18
-_PLACES = 22  # digits with which a decimal in any unit determines one double
+_LARGEST_DENOMINATOR = 10**6  # greatest denominator of a factor between units, such as 5/18
+_DECIMAL_DIGITS = 22  # digits with which a decimal in any unit determines one double
 
 
 def toml_problem(problem: Posed, comments: Iterable[str] = ()) -> str:
@@ -61,7 +61,7 @@ def exact_value(value: float, typed_unit: str, stored_unit: str) -> str:
         return repr(value)
     factor = unit_factor(typed_unit, stored_unit)
     fraction = Fraction(factor).limit_denominator(_LARGEST_DENOMINATOR)
-    with localcontext(prec=_PLACES):
+    with localcontext(prec=_DECIMAL_DIGITS):
         decimal = str(Decimal(repr(value)) * fraction.denominator / fraction.numerator)
     quotient = value / factor
     neighbours = (repr(quotient + k * math.ulp(quotient)).removesuffix(".0") for k in (0, 1, -1, 2, -2))
@@ -71,8 +71,8 @@ def exact_value(value: float, typed_unit: str, stored_unit: str) -> str:
 
 def _is_written(problem: Posed, parameter: Parameter) -> bool:
     """Return whether a parameter must be in the file: its value is neither the default nor the middle of a scenario."""
-    name, varied = parameter.name, problem.scenarios.get(parameter.name)
-    default = parameter.default if varied is None else middle_of(varied)
+    name, scenario = parameter.name, problem.scenarios.get(parameter.name)
+    default = parameter.default if scenario is None else middle_of(scenario)
     return name in problem.free or problem.fixed[name] != default
 
 
@@ -98,9 +98,13 @@ def _format_value(problem: Posed, name: str, value: Any) -> str:
 
 
 def _format_number(problem: Posed, name: str, value: float) -> str:
-    """Write a number as it was typed or in the unit of the file, whichever first gives back exactly this number."""
+    """Write a number in its typed unit, or as it was typed if only this gives back exactly the typed number."""
     unit, typed_text = problem.parameter_set[name].unit, problem.typed({name: value}).get(name, "")
     text = exact_value(value, problem.units.get(name, ""), unit)
-    if typed_text and (text[0] != '"' or str(parse_exact_quantity(text[1:-1], unit)[2]) != typed_text):
-        return toml_text(typed_text if unit in ("1", "rad") else f"{typed_text} {unit}")
-    return text
+    if not typed_text:
+        return text
+    if text.startswith('"'):
+        _, _, exact = parse_exact_quantity(text[1:-1], unit)
+        if str(exact) == typed_text:
+            return text
+    return toml_text(typed_text if unit in ("1", "rad") else f"{typed_text} {unit}")

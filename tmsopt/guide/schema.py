@@ -1,7 +1,8 @@
 """The JSON Schema of problem and study files, with which editors complete, explain and check them.
 
-It is made from the pydantic classes that read the files and from the models, in draft 2020-12. Taplo, the engine of
-Even Better TOML, uses only ``properties``, ``anyOf`` and ``$ref`` to complete and explain, but every keyword to check.
+The schema is made from the pydantic classes that read the files and from the models, in draft 2020-12. Taplo, the
+engine of Even Better TOML, uses every keyword to check a file, but only ``properties``, ``anyOf`` and ``$ref`` to
+complete and explain it.
 """
 
 import math
@@ -10,10 +11,10 @@ from typing import Any
 
 from tmsopt.models import MODELS, Parameter, ParameterSet, controlled, gain_names
 from tmsopt.models.expression import SIGN
-from tmsopt.problem.files import SHAPE as PROBLEM
+from tmsopt.problem.files import FILE_SCHEMA as PROBLEM_SCHEMA
 from tmsopt.problem.model_table import KEYS
 from tmsopt.roots.patterns.composed import pattern_names
-from tmsopt.studies.files import SHAPE as STUDY
+from tmsopt.studies.files import FILE_SCHEMA as STUDY_SCHEMA
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS
 from tmsopt.studies.study import METHODS
 
@@ -24,10 +25,10 @@ Schema = dict[str, Any]
 _NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
 _WITH_UNIT = rf"^\s*{_NUMBER}\s*[^\d\s.+-].*$"
 _NAME = "^[A-Za-z][A-Za-z0-9_]*$"
-_PART = r"(([1-9]\d*)?C?EP([2-9]|1[0-2])|weave|resonance|capsize)"
-_PATTERN = rf"^\s*{_PART}(\s*\+\s*{_PART})*\s*$"
+_PATTERN_PART = r"(([1-9]\d*)?C?EP([2-9]|1[0-2])|weave|resonance|capsize)"
+_PATTERN = rf"^\s*{_PATTERN_PART}(\s*\+\s*{_PATTERN_PART})*\s*$"
 _COMPARISON = f"^[^<>=]+({SIGN.pattern})[^<>=]+$"
-_OF_STUDY: Schema = {"anyOf": [{"required": [key]} for key in ("problem", "study", "vary")]}
+_IS_STUDY: Schema = {"anyOf": [{"required": [key]} for key in ("problem", "study", "vary")]}
 
 
 def schema() -> Schema:
@@ -39,12 +40,12 @@ def schema() -> Schema:
 
     More: docs/reference/problem_file.md
     """
-    problem, defs = _read_shape(PROBLEM)
-    study, study_defs = _read_shape(STUDY)
+    problem, defs = _read_class(PROBLEM_SCHEMA)
+    study, study_defs = _read_class(STUDY_SCHEMA)
     defs |= study_defs
     _refine_problem(problem, defs)
     _refine_study(study, defs)
-    defs |= {"parameters_own": _describe_own(defs.pop("FreeParameter"))}
+    defs |= {"parameters_own": _describe_user_parameters(defs.pop("FreeParameter"))}
     for name in MODELS:
         sets, gains = _find_sets(name), set(gain_names(name))
         gain_sets = [[p for p in parameter_set.parameters if p.name in gains] for parameter_set in sets]
@@ -61,7 +62,7 @@ def schema() -> Schema:
         "description": "A problem file or a study file of tmsopt.",
         "type": "object",
         **_suggest(_refer_to("problem"), _refer_to("study_file")),
-        "if": _OF_STUDY,
+        "if": _IS_STUDY,
         "then": _refer_to("study_file"),
         "else": _refer_to("problem"),
         "$defs": {**defs, "problem": problem, "study_file": study},
@@ -78,26 +79,27 @@ def _suggest(*schemas: Schema) -> Schema:
 
 
 def _merge_types(*kinds: Schema) -> Schema:
-    """Merge schemas of different types to one; each keyword applies to its type, so faults are shown at their place."""
+    """Merge schemas of different types; each keyword applies to one type, so that editors show faults in place."""
     return {key: value for kind in kinds for key, value in kind.items()} | {"type": [kind["type"] for kind in kinds]}
 
 
-def _read_shape(shape: Any) -> tuple[Schema, dict[str, Schema]]:
+def _read_class(section: Any) -> tuple[Schema, dict[str, Schema]]:
     """Return the schema of a pydantic class, without titles and nulls, and the schemas that it refers to."""
-    model_schema = _simplify(shape.model_json_schema())
+    model_schema = _simplify(section.model_json_schema())
     defs = {name.strip("_"): inner for name, inner in model_schema.pop("$defs", {}).items()}
     return model_schema, defs
 
 
 def _simplify(node: Any) -> Any:
+    """Simplify a schema of pydantic: without titles, nulls and underscores, and with lists of simple types."""
     match node:
         case str():
             return node.replace("#/$defs/_", "#/$defs/")
         case list():
             return [_simplify(inner) for inner in node]
         case dict():
-            titled = isinstance(node.get("title"), str)
-            result = {k: _simplify(v) for k, v in node.items() if not (k == "title" and titled)}
+            has_title = isinstance(node.get("title"), str)
+            result = {k: _simplify(v) for k, v in node.items() if not (k == "title" and has_title)}
         case _:
             return node
     if result.get("default", "") is None:
@@ -115,9 +117,9 @@ def _simplify(node: Any) -> Any:
 def _refine_problem(problem: Schema, defs: dict[str, Schema]) -> None:
     """Add the names of models, patterns and parameters, and which keys belong together."""
     keys, objective, band = problem["properties"], defs.pop("Objective"), defs.pop("Band")
-    for shape in (defs["FreeParameter"], band):
+    for inline_table in (defs["FreeParameter"], band):
         for end in ("min", "max", "start"):
-            shape["properties"].get(end, {})["pattern"] = _WITH_UNIT
+            inline_table["properties"].get(end, {})["pattern"] = _WITH_UNIT
     band["properties"]["points"] |= {"minimum": 2, "maximum": 99}
     objective["properties"]["locate"] |= {**_suggest({"enum": list(pattern_names(4))}), "pattern": _PATTERN}
     objective["properties"]["pareto"] |= {"minItems": 2, "maxItems": 3, "uniqueItems": True}
@@ -134,11 +136,11 @@ def _refine_problem(problem: Schema, defs: dict[str, Schema]) -> None:
         "else": _describe_model(),
     }
     for table, extra_names in (("parameters", ["own"]), ("feedback", [])):
-        offered = _suggest(*(_refer_to(f"{table}_{name}") for name in (*MODELS, *extra_names)))
-        keys[table] = {"description": keys[table]["description"], "type": "object", **offered}
-    _, listed = keys["scenarios"]["additionalProperties"]["anyOf"]
-    keys["scenarios"]["additionalProperties"] = _merge_types(band, listed)
-    del problem["required"]  # parameters may be missing: a measured bicycle has them in its own file
+        suggestions = _suggest(*(_refer_to(f"{table}_{name}") for name in (*MODELS, *extra_names)))
+        keys[table] = {"description": keys[table]["description"], "type": "object", **suggestions}
+    _, value_list = keys["scenarios"]["additionalProperties"]["anyOf"]
+    keys["scenarios"]["additionalProperties"] = _merge_types(band, value_list)
+    del problem["required"]  # parameters may be missing if they are in the file of a measured bicycle
     problem["if"] = {"required": ["bicycle"]}
     problem["then"] = _allow_names("whipple")
     problem["else"] = {"required": ["parameters"], **_choose_by_model([name for name in MODELS if name != "tms"])}
@@ -157,12 +159,8 @@ def _choose_by_model(names: list[str]) -> Schema:
 
 
 def _allow_names(model: str) -> Schema:
-    accepted = {
-        "propertyNames": {
-            "enum": list(dict.fromkeys(n for parameter_set in _find_sets(model) for n in parameter_set.names))
-        }
-    }
-    tables = dict.fromkeys(("scenarios", "tolerances", "weights"), accepted)
+    names = list(dict.fromkeys(n for parameter_set in _find_sets(model) for n in parameter_set.names))
+    tables = {table: {"propertyNames": {"enum": names}} for table in ("scenarios", "tolerances", "weights")}
     parameter_tables = {"parameters": _refer_to(f"parameters_{model}"), "feedback": _refer_to(f"feedback_{model}")}
     return {"properties": {**parameter_tables, **tables}}
 
@@ -181,8 +179,13 @@ def _describe_table(description: str, sets: Sequence[Sequence[Parameter]]) -> Sc
         condition = {"anyOf": [{"required": [n]} for n in members if n not in other_names]}
         accepted = {"if": condition, "then": _allow_only(members), "else": accepted}
     properties = {p.name: _describe_parameter(p) for members in sets for p in members}
-    closed = {"properties": properties, "additionalProperties": False}
-    return {"description": description, "type": "object", **accepted, **closed}
+    return {
+        "description": description,
+        "type": "object",
+        **accepted,
+        "properties": properties,
+        "additionalProperties": False,
+    }
 
 
 def _allow_only(names: Iterable[str]) -> Schema:
@@ -190,26 +193,26 @@ def _allow_only(names: Iterable[str]) -> Schema:
 
 
 def _describe_parameter(p: Parameter) -> Schema:
-    """Describe a parameter: a number, a text with a unit, or a table with bounds. Each keyword fits one of them."""
+    """Describe a parameter: a number, a text with a unit, or a table with bounds. Each keyword applies to one type."""
     limits = ("minimum", "maximum") if p.range.closed else ("exclusiveMinimum", "exclusiveMaximum")
     ends = zip(limits, (p.range.lower, p.range.upper), strict=True)
     kinds, unit, pattern = ["number"], "", {}
     if p.unit != "1":
         kinds, unit, pattern = ["number", "string"], f", in {p.unit} or a text with a unit", {"pattern": _WITH_UNIT}
     value: Schema = {"type": kinds, **{key: end for key, end in ends if math.isfinite(end)}, **pattern}
-    left_out = "" if p.default is None else f" {p.default:g} if left out."
-    free = {
-        "properties": {end: {"description": f"The {what}.", **value} for end, what in _ENDS.items()},
+    default_text = "" if p.default is None else f" {p.default:g} if left out."
+    bounds = {
+        "properties": {end: {"description": f"The {meaning}.", **value} for end, meaning in _ENDS.items()},
         "required": ["min", "max"],
         "additionalProperties": False,
     }
-    return {"description": f"{p.meaning}{unit}.{left_out}", **value, "type": [*kinds, "object"], **free}
+    return {"description": f"{p.meaning}{unit}.{default_text}", **value, "type": [*kinds, "object"], **bounds}
 
 
 _ENDS = {"min": "least value", "max": "greatest value", "start": "value to start the search from, among others"}
 
 
-def _describe_own(free: Schema) -> Schema:
+def _describe_user_parameters(free: Schema) -> Schema:
     """Describe the parameters of a user's system: any names, numbers without units."""
     return {
         "description": "Parameters of a system of your own: the names in its expressions.",
@@ -237,8 +240,8 @@ def _refine_study(study: Schema, defs: dict[str, Schema]) -> None:
     options = defs.pop("Options")
     options["properties"]["method"]["enum"] = list(METHODS)
     options["properties"]["distribution"]["enum"] = list(DISTRIBUTIONS)
-    for key, least in (("rows", 1), ("starts", 1), ("seed", 0)):
-        options["properties"][key]["minimum"] = least
+    for key, minimum in (("rows", 1), ("starts", 1), ("seed", 0)):
+        options["properties"][key]["minimum"] = minimum
     keys["study"] = {"description": keys["study"]["description"], **options}
     keys["problem"] = {
         "description": keys["problem"]["description"],

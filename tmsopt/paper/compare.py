@@ -9,7 +9,7 @@ from typing import Any, Unpack
 
 from tmsopt.evaluation.law_rows import LawRow, law_rows
 from tmsopt.models import tms
-from tmsopt.problem.files import Given, as_solvable
+from tmsopt.problem.files import ProblemSource, as_solvable
 from tmsopt.problem.solution import Solution
 from tmsopt.program.options import CommonOptions, Options, documents_options, make_options
 from tmsopt.progress import begin
@@ -62,7 +62,7 @@ class Comparison(Tabular):
 
 
 @documents_options(CommonOptions)
-def compare(design: Given, **options: Unpack[CommonOptions]) -> Comparison:
+def compare(design: ProblemSource, **options: Unpack[CommonOptions]) -> Comparison:
     """Compare a design with the laws of the paper, which hold only for skates, and solve it in another formulation.
 
     The laws describe one design at one speed. A problem with scenarios or tolerances is solved again without them.

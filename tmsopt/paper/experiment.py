@@ -15,12 +15,12 @@ TILT = np.deg2rad(20.0)
 """Assumed steer axis tilt in rad; the source gives no tilt for the experimental bicycle."""
 
 MASS_RATIOS = (0.1, 1.0, 3.0)
-"""Assumed mass ratios; the source gives no mass ratio for it."""
+"""Assumed mass ratios; the source gives no mass ratio for the experimental bicycle."""
 
-SLACK = 0.01
+FLAT_SHARE = 0.01
 """Fr_c counts as equally good if it exceeds the smallest Fr_c by at most this share."""
 
-_CURVE_POINTS = 601
+_CURVE_POINTS = 601  # number of points of a curve
 _CHECKED_SPEED = 1 + 1e-6  # speed relative to Fr_c at which stability is checked
 
 
@@ -32,18 +32,18 @@ class CriticalSpeed:
         chi_B: ascending values, shape (n,).
         Fr_c: critical Froude numbers, shape (n,); nan where no higher speed is stable.
         chi_H, mu: parameters of this curve; at χ_H = 1 the mass ratio has no influence and is nan.
-        best: (χ_B, Fr_c) at the minimum; nan if no χ_B is stable.
-        own: Fr_c at the χ_B of the experimental bicycle; nan if it is unstable.
-        flat: range of χ_B in which Fr_c exceeds the minimum by at most `SLACK`.
+        minimum: (χ_B, Fr_c) at the minimum; nan if no χ_B is stable.
+        experimental_Fr_c: Fr_c at the χ_B of the experimental bicycle; nan if it is unstable.
+        flat_range: range of χ_B in which Fr_c exceeds the minimum by at most `FLAT_SHARE`.
     """
 
     chi_B: Array
     Fr_c: Array
     chi_H: float
     mu: float
-    best: tuple[float, float]
-    own: float
-    flat: tuple[float, float]
+    minimum: tuple[float, float]
+    experimental_Fr_c: float
+    flat_range: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Experiment:
 
     Attributes:
         ratio, law: ζ_B/ζ_H and χ_B of the law, shape (n,).
-        bicycles: the experimental one first.
+        bicycles: the experimental bicycle, the benchmark, and the optimised benchmark.
         lambda_s: steer axis tilt of `critical` in rad.
         least_tilt: tilt in rad above which H is in front of the steer axis.
         critical: Fr_c over χ_B, first for χ_H = 1, then for the measured χ_H and each of `MASS_RATIOS`.
@@ -67,7 +67,7 @@ class Experiment:
 
 
 def experiment(lambda_s: float = TILT) -> Experiment:
-    """The law χ_B = √(ζ_B/ζ_H) with three bicycles, and Fr_c over χ_B for the experimental one.
+    """The law χ_B = √(ζ_B/ζ_H) with three bicycles, and Fr_c over χ_B for the experimental bicycle.
 
     Self-stability needs a tilt above `least_tilt` (equation lscf).
     """
@@ -103,12 +103,12 @@ def _compute_critical_speed(chi_H: float, mu: float, lambda_s: float) -> Critica
     chi_B, margin = np.linspace(low, high, _CURVE_POINTS)[1:-1], 1e-3 * (high - low)
     ends = low + margin, high - margin
     best = float(minimize_scalar(square, bounds=ends, method="bounded", options={"xatol": 1e-10}).x)
-    flat = np.nan, np.nan
+    flat_range = np.nan, np.nan
     if np.isfinite(value(best)):
-        # Fr_c² has one minimum between two poles; on each side of it, find where Fr_c is larger by the slack.
-        level = (1 + SLACK) ** 2 * square(best)
+        # Fr_c² has one minimum between two poles; on each side of it, find where Fr_c is larger by `FLAT_SHARE`.
+        level = (1 + FLAT_SHARE) ** 2 * square(best)
         low, high = (float(brentq(lambda x: square(x) - level, best, end)) for end in ends)
-        flat = low, high
+        flat_range = low, high
     else:
         best = np.nan
-    return CriticalSpeed(chi_B, value(chi_B), chi_H, mu, (best, value(best)), value(p["chi_B"]), flat)
+    return CriticalSpeed(chi_B, value(chi_B), chi_H, mu, (best, value(best)), value(p["chi_B"]), flat_range)

@@ -27,7 +27,8 @@ def table_1_loci() -> tuple[LocusRow, ...]:
     """The three rows of the paper's figure, one for each tilt of Table 1; χ_B is √2 or close to it, 0 < Fr ≤ 5."""
     rows = zip(table_1(), (0.01, 0.01, 0.1), strict=True)
     return tuple(
-        LocusRow(b, offset, tuple(sweep_Fr(b, shift) for shift in (0.0, -offset, offset))) for b, offset in rows
+        LocusRow(bicycle, offset, tuple(sweep_Fr(bicycle, shift) for shift in (0.0, -offset, offset)))
+        for bicycle, offset in rows
     )
 
 
@@ -38,7 +39,7 @@ def sweep_Fr(bicycle: ReferenceBicycle, shift: float = 0.0) -> Growth:
 
 
 def multiple_roots(data: Growth) -> Iterator[tuple[str, float, complex]]:
-    """Name, Fr and value of each multiple root: of the design's exceptional point, and of every other ``EP2``."""
+    """Name, Fr and value of each multiple root: first the exceptional point of the design, then every other ``EP2``."""
     yield from ((data.structure, data.design, complex(r.re, r.im)) for r in data.multiple)
     for event in data.events:
         if event.kind == "EP2" and abs(event.at - data.design) > _SPLIT_DISTANCE:

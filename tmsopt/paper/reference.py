@@ -61,7 +61,7 @@ def ep_set_bicycle(name: str, tilt_offset: float) -> ReferenceBicycle:
 
 
 def _make_bicycle(name: str, point: laws.EP4, **known: float) -> ReferenceBicycle:
-    """A bicycle with the heights of the benchmark; the laws give its other parameters, except the known ones."""
+    """A bicycle with the heights of the benchmark and the known parameters; the laws give the other parameters."""
     known |= {"zeta_B": ZETA_B, "zeta_H": ZETA_H}
     parameters = {n: known[n] if n in known else float(getattr(point, n)) for n in ("Fr", *_GEOMETRY)}
     return ReferenceBicycle(name, Table(parameters), float(point.omega0))

@@ -15,8 +15,8 @@ class Sketch:
     Attributes:
         parameters: the native parameters.
         rear, front: contact points of the skates, shape (2,).
-        B, H: the two masses.
-        axis: unit vector along the steer axis, upward; the axis passes through the front contact (zero trail).
+        B, H: the two masses, shape (2,).
+        axis: upward unit vector along the steer axis, which passes through the front contact (zero trail).
         foot: foot of the perpendicular from H on the steer axis.
         nu_H: signed distance of H from the axis, positive in front of it (text below equation matrices).
     """
@@ -42,7 +42,9 @@ def sketch(parameters: Mapping[str, float]) -> Sketch:
     """
     p = Table(parameters)
     front, H = np.array([1.0, 0.0]), np.array([p["chi_H"], p["zeta_H"]])
-    axis = -np.array([np.sin(p["lambda_s"]), np.cos(p["lambda_s"])])  # with a positive tilt, its top leans back
+    axis = -np.array(
+        [np.sin(p["lambda_s"]), np.cos(p["lambda_s"])]
+    )  # with a positive tilt, the top of the axis leans back
     forward = np.array([-axis[1], axis[0]])
     foot = front + np.dot(H - front, axis) * axis
     return Sketch(

@@ -21,18 +21,18 @@ class UniversalPath:
     """The path of a design of Table 1 in the universal chart while Fr is swept.
 
     Attributes:
-        name: name of its exceptional point.
+        name: name of the exceptional point of the design.
         tilt: λ_s in rad.
         A: columns A1, A2, A3, shape (n, 3); A1 = A3, because χ_B obeys the law.
-        stable: the point at which the design becomes stable, shape (3,).
-        exceptional: the exceptional point, shape (3,).
+        stability_onset: the point at which the design becomes stable, shape (3,).
+        exceptional_point: the exceptional point, shape (3,).
     """
 
     name: str
     tilt: float
     A: Array
-    stable: Array
-    exceptional: Array
+    stability_onset: Array
+    exceptional_point: Array
 
 
 def table_1_paths() -> list[UniversalPath]:
@@ -40,10 +40,11 @@ def table_1_paths() -> list[UniversalPath]:
     paths = []
     for bicycle in table_1():
         data = sweep_Fr(bicycle)
-        onset = next(c.at for c in data.events if c.changes)
-        a = tms.coefficients({**bicycle.parameters, "Fr": np.array([onset, data.design, *data.values])}, tms.sets[0])
-        stable, exceptional, *A = normalise_quartics(np.stack(np.broadcast_arrays(*a), axis=-1))
-        paths.append(UniversalPath(bicycle.name, bicycle.parameters["lambda_s"], np.array(A), stable, exceptional))
+        onset_Fr = next(event.at for event in data.events if event.changes)
+        Fr = np.array([onset_Fr, data.design, *data.values])
+        a = tms.coefficients({**bicycle.parameters, "Fr": Fr}, tms.sets[0])
+        onset, ep, *A = normalise_quartics(np.stack(np.broadcast_arrays(*a), axis=-1))
+        paths.append(UniversalPath(bicycle.name, bicycle.parameters["lambda_s"], np.array(A), onset, ep))
     return paths
 
 
@@ -60,7 +61,7 @@ def ep_set(A1: ArrayLike) -> Array:
 
 
 def heavy_section(A1: ArrayLike) -> tuple[Array, Array]:
-    """Smallest and largest A2 of heavy damping in the plane A3 = A1; nan for A1 < 4, where no A2 gives it.
+    """Smallest and largest A2 of heavy damping in the plane A3 = A1; nan for A1 < 4, where damping is never heavy.
 
     In this plane the polynomial is σ² (y² + A1 y + A2 − 2), y = σ + 1/σ. All σ are real and negative exactly if both y
     are real and at most −2: A2 ≤ 2 + A1²/4 and, as −A1/2 ≤ −2, A2 ≥ 2 A1 − 2.
@@ -83,9 +84,9 @@ def spire(m: ArrayLike, t: ArrayLike) -> Array:
 def spire_faces(limit: float, points: int = 41) -> tuple[Array, Array, Array]:
     """The three faces of the boundary of heavy damping up to max(A1, A3) = limit > 4, shape (points, points, 3) each.
 
-    On the faces, the double root has the largest modulus, the smallest, or one between those of the other roots. The
-    first axis of a face runs from EP4 to the limit, the second from one edge to the next: 2EP2 to EP3, 2EP2 to EP3, EP3
-    to EP3.
+    On the first face the double root has the largest modulus of all roots, on the second face the smallest, and on the
+    third face a modulus between those of the other roots. The first axis of a face runs from EP4 to the limit. The
+    second axis runs from one edge to another: from 2EP2 to EP3 on the first two faces, from EP3 to EP3 on the third.
     """
     u = np.linspace(0, 1, points)
 

@@ -57,7 +57,7 @@ class AxisScale(NamedTuple):
 
     def to_axis(self, values: ArrayLike) -> Array:
         """Convert numbers to the unit of the axis."""
-        return np.asarray(values, dtype=float) / self.unit.one
+        return np.asarray(values, dtype=float) / self.unit.factor
 
 
 class PlaneAxes(NamedTuple):

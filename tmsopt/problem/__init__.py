@@ -1,7 +1,7 @@
 """Problems and solutions as data: expressions, units, problem files, validation.
 
-In: a problem file, or the arguments of `Problem`. Out: a frozen `Problem` whose numbers are all checked, and
-the record `Solution` for its answer. Open `problem` first, then `expression`.
+In: a problem file, or the arguments of `Problem`. Out: a frozen `Problem` with valid numbers only, and the record
+`Solution` for its answer. Open `problem` first, then `expression`.
 """
 
 import lazy_loader

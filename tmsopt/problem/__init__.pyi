@@ -5,7 +5,7 @@ from .expression import (
     parse_value as parse_value,
 )
 from .evaluate import array_function as array_function, evaluate as evaluate
-from .files import Given as Given, load as load, as_solvable as as_solvable, pose as pose
+from .files import ProblemSource as ProblemSource, load as load, as_solvable as as_solvable, pose as pose
 from .freedom import degrees_of_freedom as degrees_of_freedom
 from .limit import limit_value as limit_value, replace_limit as replace_limit
 from .problem import Posed as Posed, Problem as Problem

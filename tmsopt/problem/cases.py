@@ -9,10 +9,10 @@ import numpy as np
 
 from tmsopt.records import AnyNumbers, Numbers, Table
 
-POINTS = 7
+DEFAULT_POINT_COUNT = 7
 """Number of points of a band in the first search. If the worst case lies between two points, more are added."""
 
-LARGEST = 16
+_MAX_CORNER_CASES = 16
 """Greatest number of cases in the first search with tolerances; the worst-case check covers the other corners."""
 
 
@@ -31,7 +31,7 @@ class Band:
 
     min: float
     max: float
-    points: int = POINTS
+    points: int = DEFAULT_POINT_COUNT
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -74,8 +74,8 @@ class Case:
         for name, change in self.offset.items():
             values[name] = values[name] + change
         distance = 1.0 if self.edge else radius
-        for name, share in self.direction.items():
-            values[name] = values[name] + distance * share * weight_of(name, parameters[name], weights or {})
+        for name, slope in self.direction.items():
+            values[name] = values[name] + distance * slope * weight_of(name, parameters[name], weights or {})
         return values
 
 
@@ -131,9 +131,9 @@ def first_cases(
         Table({n: s * t for (n, t), s in zip(tolerances.items(), signs, strict=True)})
         for signs in itertools.product((-1.0, 1.0), repeat=len(tolerances))
     ]
-    pairs = [tuple(corners)] * len(grid)
-    if len(grid) * len(corners) > LARGEST:  # two opposite corners per scenario, in turn
-        pairs = [(corners[k % len(corners)], corners[-1 - k % len(corners)]) for k in range(len(grid))]
-    cases = tuple(Case(at, corner) for at, pair in zip(grid, pairs, strict=True) for corner in pair)
+    corners_of_points = [tuple(corners)] * len(grid)
+    if len(grid) * len(corners) > _MAX_CORNER_CASES:  # two opposite corners at each point, other ones at the next point
+        corners_of_points = [(corners[k % len(corners)], corners[-1 - k % len(corners)]) for k in range(len(grid))]
+    cases = tuple(Case(at, offset) for at, offsets in zip(grid, corners_of_points, strict=True) for offset in offsets)
     steps = tuple(Case(direction=Table({name: sign})) for name in directions for sign in (-1.0, 1.0))
     return (() if cases == (Case(),) else cases) + steps

@@ -17,16 +17,16 @@ from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, RADIUS, ROOT
 WORSE_DIRECTION = {"abscissa": 1.0, "damping_ratio": -1.0, ANGULAR_FREQUENCY: 1.0}
 """Root quantity → sign of a change for the worse. The nonlinear program bounds the quantity on that side only."""
 
-_LESS_STABLE = {"abscissa": 1.0, "damping_ratio": -1.0, RADIUS: -1.0}
+_LESS_STABLE_DIRECTION = {"abscissa": 1.0, "damping_ratio": -1.0, RADIUS: -1.0}
 """Root quantity → sign of a change towards less stability."""
 
-STABLE = "every root left of the axis"
+STABILITY_CONSTRAINT = "every root left of the axis"
 """Name of a stability constraint that the problem itself does not state."""
 
 _LEAST_DECAY = 0.01  # least decay rate of a clearly stable design, relative to the mean size of the roots
-_DESIGN_COUNT = 32  # random designs at which an expression is tested for its dependence on a quantity
-_DECADES = 3.0  # random sizes of a root quantity lie up to this many powers of ten above and below 1
-_STEP = 1e-3  # relative change of the quantity in these tests
+_DESIGN_COUNT = 32  # number of random designs at which an expression is tested for its dependence on a quantity
+_MAX_DECADES = 3.0  # random sizes of a root quantity lie up to this many powers of ten above and below 1
+_STEP = 1e-3  # relative change of a quantity at these random designs
 
 
 def depends_on_case(problem: Posed, expression: Expression, cases: Sequence[Case]) -> bool:
@@ -48,19 +48,20 @@ def needs_two_sided_bounds(problem: Posed) -> bool:
     angular frequency from above and the damping ratio from below. These bounds are exact if the objective and the
     constraints do not improve as the first two grow or the damping ratio falls.
     """
-    return any(rewards_change_of(problem, name, worse) for name, worse in WORSE_DIRECTION.items())
+    return any(rewards_change_of(problem, name, direction) for name, direction in WORSE_DIRECTION.items())
 
 
-def rewards_change_of(problem: Posed, name: str, worse: float = 1.0) -> bool:
-    """Whether the objective or a constraint improves at some design as a quantity grows (falls if `worse` is −1)."""
+def rewards_change_of(problem: Posed, name: str, direction: float = 1.0) -> bool:
+    """Whether the objective or a constraint improves at some design as a quantity grows (direction 1) or falls (−1)."""
     terms = [(problem.sign, problem.objective), *((c.sign, c) for c in problem.conditions.values())]
-    return any(e is not None and _can_fall(problem, sign, e, name, worse) for sign, e in terms)
+    return any(e is not None and _can_fall(problem, sign, e, name, direction) for sign, e in terms)
 
 
 def stability_limit(problem: Posed, least_decay: float = _LEAST_DECAY) -> dict[str, str]:
     """Name → a constraint that keeps designs stable; empty if neither the limits nor the objective require it.
 
-    It allows roots on the imaginary axis if the limits allow them and the objective does not depend on the roots.
+    The constraint allows roots on the imaginary axis if the limits allow them and the objective does not depend on the
+    roots.
 
     Args:
         least_decay: least decay rate relative to the mean size of the roots.
@@ -83,16 +84,16 @@ def stability_limit(problem: Posed, least_decay: float = _LEAST_DECAY) -> dict[s
         return {}
     allows_edge = not objective_uses_roots and not is_excluded(0.0, 0.0)
     decay = 0.0 if allows_edge or not 0 < size < np.inf else least_decay * size
-    return {STABLE: f"abscissa <= {0.0 - decay!r}"}
+    return {STABILITY_CONSTRAINT: f"abscissa <= {0.0 - decay!r}"}
 
 
 def sense_notes(problem: Posed) -> tuple[str, ...]:
     """A note for the reader if the objective improves only while stability gets worse."""
     sign, goal, text = problem.sign, problem.objective, problem.goal
-    directions = {n: worse for n, worse in _LESS_STABLE.items() if problem.free and goal and n in goal.names}
+    directions = {n: d for n, d in _LESS_STABLE_DIRECTION.items() if problem.free and goal and n in goal.names}
     if not goal or not any(
-        _can_fall(problem, sign, goal, n, worse) and not _can_fall(problem, sign, goal, n, -worse)
-        for n, worse in directions.items()
+        _can_fall(problem, sign, goal, n, d) and not _can_fall(problem, sign, goal, n, -d)
+        for n, d in directions.items()
     ):
         return ()
     opposite = f'{"maximize" if problem.maximize is None else "minimize"} = "{text}"'
@@ -106,25 +107,30 @@ def demands_heavy_damping(problem: Posed) -> bool:
     return any(c.holds(float(c(at_one))) and not c.holds(float(c(below_one))) for c in limits)
 
 
-def _can_fall(problem: Posed, sign: float, expression: Expression, name: str, worse: float) -> bool:
-    """Whether `sign` times an expression falls at some design as a quantity gets worse; for an equality, changes."""
+def _can_fall(problem: Posed, sign: float, expression: Expression, name: str, direction: float) -> bool:
+    """Whether `sign` times an expression falls at some design as a quantity moves in a direction, 1 or −1.
+
+    For an equality, any change of the expression counts.
+    """
     if name in ROOT_NAMES and name not in expression.names:
         return False
     if expression.text.strip() == name:  # the most common case
-        return sign * worse < 0
+        return sign * direction < 0
     if side := limit_side(expression.text, name):
-        return expression.equality or sign * worse * side < 0
+        return expression.equality or sign * direction * side < 0
     rng = np.random.default_rng(0)
     ends = np.array([*problem.free.values()]).reshape(-1, 2)
     for _ in range(_DESIGN_COUNT):
         design = problem.ordered(dict(zip(problem.free, rng.uniform(*ends.T).tolist(), strict=True)))
-        root_values = {n: float(rng.choice((-1, 1)) * 10 ** rng.uniform(-_DECADES, _DECADES)) for n in ROOT_NAMES}
+        root_values = {
+            n: float(rng.choice((-1, 1)) * 10 ** rng.uniform(-_MAX_DECADES, _MAX_DECADES)) for n in ROOT_NAMES
+        }
         root_values |= {n: abs(root_values[n]) for n in (ANGULAR_FREQUENCY, RADIUS)}
         root_values["damping_ratio"] = float(rng.uniform(-1, 1))
         value = root_values.setdefault(name, float(rng.uniform(0.1, 2.0)))
         old_value, new_value = (
             float(expression(problem.values(design).with_known(root_values | {name: x})))
-            for x in (value, value + worse * _STEP * min(1.0, abs(value)))
+            for x in (value, value + direction * _STEP * min(1.0, abs(value)))
         )
         change = sign * (new_value - old_value)
         if change < 0 or (expression.equality and change != 0):

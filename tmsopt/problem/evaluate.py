@@ -101,7 +101,7 @@ def roots_of(coefficients: Collection[Any], names: Collection[str] = ROOTS) -> d
 
 
 def nodes_of(problem: Posed, expressions: Mapping[str, str | Expression]) -> dict[str, Any]:
-    """Expressions as nodes that depend on parameters and root quantities; a comparison gives left minus right."""
+    """Expressions as nodes of a formula in parameters and root quantities; a comparison gives left minus right."""
     parameter_set = problem.parameter_set
     values = Values(problem.model, parameter_set, {n: symbol(n) for n in parameter_set.names}, extra=(NO_RADIUS,))
     values = values.with_known({n: symbol(n) for n in ROOTS})

@@ -13,13 +13,13 @@ from tmsopt.errors import Fault, InputError, escape_unprintable, short, suggest
 from tmsopt.models import MODELS, Model, gain_names
 from tmsopt.models.bicycle_files import read_bicycle
 from tmsopt.problem.advice.names import suggest_key
-from tmsopt.problem.cases import POINTS, Band
+from tmsopt.problem.cases import DEFAULT_POINT_COUNT, Band
 from tmsopt.problem.freedom import find_objective_faults
-from tmsopt.problem.model_table import stated_model
+from tmsopt.problem.model_table import read_model_table
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.toml import Number, Page, Section, Tables, read_page, validate_tables
-from tmsopt.problem.validate import VARIATIONS
+from tmsopt.problem.validate import EXTRA_PARAMETER_TABLES
 
 _NO_PARAMETERS = "missing section [parameters]"
 
@@ -42,7 +42,7 @@ class _Band(Section):
     """The least value."""
     max: Number
     """The greatest value."""
-    points: StrictInt = POINTS
+    points: StrictInt = DEFAULT_POINT_COUNT
     """Number of values in the first search, 2 to 99."""
 
 
@@ -84,11 +84,11 @@ class _File(Section):
     """Size of a change that counts as 1 in radius, the robustness radius."""
 
 
-SHAPE: type[Section] = _File
+FILE_SCHEMA: type[Section] = _File
 """The schema of a problem file, for editors."""
 
-Given = Problem | Posed | Solution | str | PathLike[str]
-"""A problem, the path of its file, or a solution, which contains its problem."""
+ProblemSource = Problem | Posed | Solution | str | PathLike[str]
+"""Where functions get a problem from: a problem, the path of its file, or a solution, which contains its problem."""
 
 
 def load(path: str | PathLike[str]) -> Problem:
@@ -108,7 +108,7 @@ def load(path: str | PathLike[str]) -> Problem:
 
 
 def pose(source: object) -> Posed:
-    """The posed problem of a problem, of a problem file, or of a solution.
+    """The problem in the form that is solved (`Posed`), from a problem, a problem file, or a solution.
 
     Raises:
         InputError: for a file with faults, or for anything else.
@@ -116,13 +116,13 @@ def pose(source: object) -> Posed:
     return _pose(source, lambda problem: [])
 
 
-def as_solvable(source: object, front: bool = False) -> Posed:
-    """The posed problem as for `pose`, which must ask for one design, or for a Pareto front if `front` is set.
+def as_solvable(source: object, allows_front: bool = False) -> Posed:
+    """Like `pose`, but the problem must ask for one design. If `allows_front`, it may ask for a Pareto front instead.
 
     Raises:
         InputError: as for `pose`, and if parameters are free but there is no objective.
     """
-    return _pose(source, lambda problem: [] if front and problem.pareto else find_objective_faults(problem))
+    return _pose(source, lambda problem: [] if allows_front and problem.pareto else find_objective_faults(problem))
 
 
 def _pose(source: object, faults_of: Callable[[Posed], list[Fault]]) -> Posed:
@@ -141,9 +141,9 @@ def _pose(source: object, faults_of: Callable[[Posed], list[Fault]]) -> Posed:
 def _load_problem(path: str | PathLike[str], faults_of: Callable[[Posed], list[Fault]]) -> Problem:
     page = read_page(path, "problem")
     if "parameters" not in page.data and {"problem", "study", "vary"} & set(page.data):
-        written = page.data.get("problem")
-        advice = f"its problem, {written}" if isinstance(written, str) else "a file with its [problem] alone"
-        message = f"is a study of many designs, not a problem; run tmsopt study {page.file}, or give {advice}"
+        base = page.data.get("problem")
+        advice = f"give its problem file, {base}" if isinstance(base, str) else "write its [problem] in a separate file"
+        message = f"is a study of many designs, not a problem; run tmsopt study {page.file}, or {advice}"
         raise InputError([Fault(message, file=page.file)])
     faults, problem = problem_from_tables(_add_bicycle_parameters(page), escape_unprintable(Path(page.file).stem))
     if problem is not None and not faults:  # a misspelt [objective] is not a missing objective
@@ -154,7 +154,7 @@ def _load_problem(path: str | PathLike[str], faults_of: Callable[[Posed], list[F
 
 
 def _add_bicycle_parameters(page: Page) -> Tables:
-    """The tables with the parameters of their `bicycle` file; the file's own parameters take precedence."""
+    """The tables of a file with the parameters of its `bicycle` file; a parameter of the file itself has priority."""
     data, bicycle_file, parameters = page.data, page.data.get("bicycle"), page.data.get("parameters", {})
     if not isinstance(bicycle_file, str) or not isinstance(parameters, dict):
         return data
@@ -176,10 +176,10 @@ def problem_from_tables(data: Tables, title: str) -> tuple[list[Fault], Problem 
     Args:
         title: used if the file has none.
     """
-    gains_faults, gains, data = _split_gains(data)
+    gain_faults, gains, data = _split_gains(data)
     faults, parsed = validate_tables(data, _File, _explain_shape)
     if any(hint in f.message for f in faults for hint in ("did you mean 'parameters'", "write [parameters]")):
-        faults = [f for f in faults if f.message != _NO_PARAMETERS]  # present under a misspelt name
+        faults = [f for f in faults if f.message != _NO_PARAMETERS]  # the section has a misspelt name
     model_faults, model = _find_model(data.get("model", "tms"))
     faults += model_faults
     problem = None
@@ -187,7 +187,7 @@ def problem_from_tables(data: Tables, title: str) -> tuple[list[Fault], Problem 
         tables = _collect_tables(parsed)
         for fault in faults:
             if fault.key[:1] in (("parameters",), ("scenarios",)) and len(fault.key) > 1:
-                tables["fixed"][fault.key[1]] = math.nan  # given, and its fault already reported
+                tables["fixed"][fault.key[1]] = math.nan  # the parameter is given, and its fault is already reported
         objective = vars(parsed.objective) | {"pareto": parsed.objective.pareto or ()}
         title = parsed.title.strip() or title
         try:
@@ -196,12 +196,13 @@ def problem_from_tables(data: Tables, title: str) -> tuple[list[Fault], Problem 
             reported_keys = {f.key[:2] for f in faults} | {("parameters", *f.key[1:2]) for f in faults}
             reported_keys |= {f.key[:1] for f in faults if f.key[:1] == ("objective",)}
             faults += [f for f in error.faults if f.key[:2] not in reported_keys]
-    named_faults = [replace(f, key=("feedback", *f.key[1:])) if {*f.key[1:2]} & gains else f for f in faults]
-    return gains_faults + named_faults, problem
+    # The gains were checked as parameters, but the user wrote them in [feedback].
+    faults = [replace(f, key=("feedback", *f.key[1:])) if {*f.key[1:2]} & gains else f for f in faults]
+    return gain_faults + faults, problem
 
 
 def _split_gains(data: Tables) -> tuple[list[Fault], set[str], Tables]:
-    """Faults of [feedback], its valid names, and the tables of the file with the gains moved to [parameters]."""
+    """Faults of [feedback], names of its valid gains, and the tables of the file with these gains in [parameters]."""
     gains, parameters, model = data.get("feedback", {}), data.get("parameters", {}), data.get("model", "tms")
     if not gains or not isinstance(gains, dict) or not isinstance(parameters, dict):
         return [], set(), data
@@ -209,7 +210,7 @@ def _split_gains(data: Tables) -> tuple[list[Fault], set[str], Tables]:
     accepted = gain_names(model) if isinstance(model, str) else ()
     if not accepted:
         message = "is for the bicycles tms and whipple; write B, C and G in [model] for your own system"
-        is_misspelt = isinstance(model, str) and model not in MODELS  # reported elsewhere
+        is_misspelt = isinstance(model, str) and model not in MODELS  # `_find_model` reports it
         return [] if is_misspelt else [Fault(message, ("feedback",))], set(), remaining_data
     faults = []
     for name in gains:
@@ -226,20 +227,20 @@ def _split_gains(data: Tables) -> tuple[list[Fault], set[str], Tables]:
 def _find_model(entry: Any) -> tuple[list[Fault], Model | None]:
     """The faults of the key ``model``, and the model that its name or table means."""
     if isinstance(entry, dict):
-        return stated_model(entry)
+        return read_model_table(entry)
     if not isinstance(entry, str):
-        return [], None  # reported with the shape of the file
+        return [], None  # `validate_tables` reports it
     if entry in MODELS:
         return [], MODELS[entry]
     message = f"unknown model {short(entry)}; {suggest(entry, MODELS)}; your own goes in a table [model]"
     return [Fault(message, ("model",))], None
 
 
-_ENTRIES: Mapping[str, tuple[type[Section], str]] = {
+_INLINE_TABLES: Mapping[str, tuple[type[Section], str]] = {
     "parameters": (_FreeParameter, "{ min = …, max = … }"),
     "scenarios": (_Band, "{ min = …, max = …, points = 7 }"),
 }
-"""Table → schema of an entry that is a table, and an example."""
+"""Section → schema of its inline tables, and an example."""
 
 _ACCEPTED = {
     "model": "the name of a model in quotes, or a table [model]",
@@ -250,13 +251,14 @@ _ACCEPTED = {
     "pareto": "two or three texts, such as ['abscissa', 'Fr']",
     "constraints": "a comparison in quotes, such as 'nu_H >= 0.02'",
 }
-"""Table or key → accepted values."""
+"""Section or key → accepted values."""
 
 
-def _explain_shape(where: tuple[int | str, ...], kind: str, value: Any) -> Fault:
+def _explain_shape(location: tuple[int | str, ...], kind: str, value: Any) -> Fault:
     """The fault for an error message of pydantic, in the words of the problem file."""
-    tags = ("_FreeParameter", "_Band", "float", "int", "str", "dict[str,any]")
-    key = tuple(str(k) for k in where if k not in tags)
+    # Pydantic adds these names of types to the keys of a location.
+    type_names = ("_FreeParameter", "_Band", "float", "int", "str", "dict[str,any]")
+    key = tuple(str(k) for k in location if k not in type_names)
     match key:
         case (section,) if kind == "extra_forbidden":
             return Fault(f"unknown key {short(section)}; {suggest_key(section, _File.model_fields)}", key)
@@ -265,11 +267,13 @@ def _explain_shape(where: tuple[int | str, ...], kind: str, value: Any) -> Fault
         case ("parameters",) if kind == "missing":
             return Fault(_NO_PARAMETERS, key)
         case ("parameters" | "scenarios" as table, name, end, *_) if kind == "extra_forbidden":
-            return Fault(f"unknown key {short(end)} of {name}; {suggest(end, _ENTRIES[table][0].model_fields)}", key)
+            return Fault(
+                f"unknown key {short(end)} of {name}; {suggest(end, _INLINE_TABLES[table][0].model_fields)}", key
+            )
         case ("parameters" | "scenarios" as table, name, end) if kind == "missing":
-            return Fault(f"missing {end} of {name}; write {name} = {_ENTRIES[table][1]}", key)
+            return Fault(f"missing {end} of {name}; write {name} = {_INLINE_TABLES[table][1]}", key)
     section, *inner = key
-    is_table = section in ("parameters", "objective", *VARIATIONS)
+    is_table = section in ("parameters", "objective", *EXTRA_PARAMETER_TABLES)
     accepted = "a table" if is_table else "a text in quotes"
     if inner or not is_table:
         accepted = _ACCEPTED.get("pareto" if inner[:1] == ["pareto"] else section, accepted)
@@ -278,15 +282,15 @@ def _explain_shape(where: tuple[int | str, ...], kind: str, value: Any) -> Fault
     )
 
 
-def _collect_tables(written: _File) -> dict[str, Any]:
+def _collect_tables(parsed: _File) -> dict[str, Any]:
     """The tables of a problem, with numbers and texts as they were typed."""
-    free = {n: v for n, v in written.parameters.items() if isinstance(v, _FreeParameter)}
-    bands = {n: Band(**vars(s)) for n, s in written.scenarios.items() if isinstance(s, _Band)}
+    free = {n: v for n, v in parsed.parameters.items() if isinstance(v, _FreeParameter)}
+    bands = {n: Band(**vars(s)) for n, s in parsed.scenarios.items() if isinstance(s, _Band)}
     return {
-        "fixed": {n: v for n, v in written.parameters.items() if n not in free},
+        "fixed": {n: v for n, v in parsed.parameters.items() if n not in free},
         "free": {n: (v.min, v.max) for n, v in free.items()},
         "start": {n: v.start for n, v in free.items() if v.start is not None},
-        "scenarios": {**written.scenarios, **bands},
-        "tolerances": written.tolerances,
-        "weights": written.weights,
+        "scenarios": {**parsed.scenarios, **bands},
+        "tolerances": parsed.tolerances,
+        "weights": parsed.weights,
     }

@@ -11,25 +11,25 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 class WrittenLimit(NamedTuple):
     """A number on one side of a comparison, with the text before and after it."""
 
-    before: str
+    text_before: str
     value: float
-    behind: str
+    text_after: str
 
     def replace_number(self, number: str) -> str:
         """The comparison with another number."""
-        return f"{self.before}{number}{self.behind}"
+        return f"{self.text_before}{number}{self.text_after}"
 
 
 def split_limit(text: str) -> WrittenLimit | None:
-    """Split a comparison at the number on one side; None if neither side is just a number.
+    """Split a comparison at the number on one side; None if neither side is a number.
 
     Raises:
         ExpressionError: for a text that does not parse.
     """
     left, sign, right = written_sides(text)
-    for text_before, side, text_behind in (("", left, f" {sign} {right}"), (f"{left} {sign} ", right, "")):
+    for text_before, side, text_after in (("", left, f" {sign} {right}"), (f"{left} {sign} ", right, "")):
         if _NUMBER.fullmatch(number := _remove_blanks(side)):
-            return WrittenLimit(text_before, float(number), text_behind)
+            return WrittenLimit(text_before, float(number), text_after)
     return None
 
 
@@ -40,9 +40,9 @@ def limit_value(text: str) -> float | None:
 
 
 def limit_side(text: str, name: str) -> int:
-    """1 for ``name <= number``, −1 for ``number <= name``, with any sign of comparison; 0 for any other comparison.
+    """1 for a name on the left and a number on the right, −1 for the reverse, 0 for any other comparison.
 
-    Parentheses are ignored, as in ``(abscissa) <= -0.3``.
+    The sign of the comparison may be ``<=``, ``>=`` or ``==``. Parentheses are ignored, as in ``(abscissa) <= -0.3``.
     """
     sides = [_remove_blanks(side).strip("()") for side in SIGN.split(text)]
     if len(sides) != 2 or name not in sides:

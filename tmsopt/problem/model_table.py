@@ -30,9 +30,9 @@ _EXCLUSIVE_KEYS = {
     "coefficients": "coefficients, or the matrices",
     "H": "H, a complex system, or the matrices of a real one",
 }
-"""Key that allows no other key of a system → the alternatives, for messages."""
+"""Key that excludes the other keys of a system → the alternatives, for messages."""
 
-_DESCENDING = "accepted: expressions in brackets, by descending powers of s, such as ['1', 'c', 'k']"
+_ACCEPTED_COEFFICIENTS = "accepted: expressions in brackets, by descending powers of s, such as ['1', 'c', 'k']"
 
 _EXAMPLE = (
     "write M = [['m']], D = [['c']], K = [['k']], or A = [['a', '1'], ['b', '0']], "
@@ -40,7 +40,7 @@ _EXAMPLE = (
 )
 
 
-def stated_model(table: Tables) -> tuple[list[Fault], Model | None]:
+def read_model_table(table: Tables) -> tuple[list[Fault], Model | None]:
     """The faults of a [model] table, and its model.
 
     An entry is a number or an expression. A name in an expression means a parameter, or a quantity of
@@ -64,8 +64,8 @@ def stated_model(table: Tables) -> tuple[list[Fault], Model | None]:
     for exclusive_key, alternatives in _EXCLUSIVE_KEYS.items():
         if exclusive_key in system_keys and (other_keys := [key for key in system_keys if key != exclusive_key]):
             fault(f"found together with {other_keys[0]}; keep {alternatives}", exclusive_key)
-    texts = _quantities(table.get("quantities", {}), fault)
-    entries, quantities = parse_entries({key: _rows(table[key], key, fault) for key in system_keys}, texts, fault)
+    texts = _read_quantities(table.get("quantities", {}), fault)
+    entries, quantities = parse_entries({key: _read_rows(table[key], key, fault) for key in system_keys}, texts, fault)
     if faults:
         return faults, None
     try:
@@ -82,7 +82,7 @@ def stated_model(table: Tables) -> tuple[list[Fault], Model | None]:
         return [Fault(error.message, ("model", error.key))], None
 
 
-def _square(entries: Any) -> str:
+def _suggest_rows(entries: Any) -> str:
     """The advice to write a list of n² entries as n rows; empty for any other value."""
     n = math.isqrt(len(entries)) if isinstance(entries, list) else 0
     if not n or n * n != len(entries) or any(isinstance(x, list) for x in entries):
@@ -90,26 +90,27 @@ def _square(entries: Any) -> str:
     return f"write {short([entries[k : k + n] for k in range(0, n * n, n)])}; "
 
 
-def _quantities(written: Any, fault: Callable[..., None]) -> dict[str, str]:
-    if not isinstance(written, dict):
-        fault(f"found {short(written)}; accepted: a table [model.quantities]", "quantities")
+def _read_quantities(table: Any, fault: Callable[..., None]) -> dict[str, str]:
+    """Name → expression, without the faulty entries."""
+    if not isinstance(table, dict):
+        fault(f"found {short(table)}; accepted: a table [model.quantities]", "quantities")
         return {}
-    for name, text in written.items():
+    for name, text in table.items():
         if not isinstance(text, str):
             fault(f"found {short(text)}; accepted: an expression in quotes, such as 'k1/k2'", "quantities", name)
-    return {name: text for name, text in written.items() if isinstance(text, str)}
+    return {name: text for name, text in table.items() if isinstance(text, str)}
 
 
-def _rows(written: Any, key: str, fault: Callable[..., None]) -> Matrix:
+def _read_rows(entries: Any, key: str, fault: Callable[..., None]) -> Matrix:
     """Rows of numbers and texts, with 0 for a faulty entry; coefficients form one row."""
-    rows = [written] if key == "coefficients" else written
-    if not isinstance(rows, list) or not rows or (rows is written and not all(isinstance(row, list) for row in rows)):
-        accepted = "accepted: rows in brackets, such as [['m', 0], [0, 'm']], each expression in quotes of its own"
-        fault(f"found {short(rows)}; {_square(rows)}{accepted}", key)
+    rows = [entries] if key == "coefficients" else entries
+    if not isinstance(rows, list) or not rows or (rows is entries and not all(isinstance(row, list) for row in rows)):
+        accepted = "accepted: rows in brackets, such as [['m', 0], [0, 'm']], with quotes around each expression"
+        fault(f"found {short(rows)}; {_suggest_rows(rows)}{accepted}", key)
         return []
     for row in rows:
         if not isinstance(row, list) or not row:
-            fault(f"found {short(row)}; {_DESCENDING}", key)
+            fault(f"found {short(row)}; {_ACCEPTED_COEFFICIENTS}", key)
             return []
     for i, row in enumerate(rows, start=1):
         for j, x in enumerate(row, start=1):

@@ -1,4 +1,7 @@
-"""Turns a problem as stated into one that can be solved: numbers in rad and SI, complete tables, all faults at once."""
+"""Turns the arguments of a problem into fields that can be solved: numbers in rad and SI, complete tables.
+
+Lists all faults at once.
+"""
 
 from types import SimpleNamespace
 from typing import Any
@@ -25,7 +28,7 @@ def normalise(**arguments: Any) -> dict[str, Any]:
     problem.scenarios = {n: parse_scenario(s) for n, s in problem.scenarios.items()}
     names = {**problem.fixed, **problem.free, **problem.scenarios}
     problem.model = controlled(problem.model, names)
-    # The parameter set with most of the names; the native one in case of a tie.
+    # The parameter set that has most of the names; in case of a tie, the native one.
     parameter_set = max(problem.model.sets, key=lambda s: len(names.keys() & set(s.names)))
     tables = {table: getattr(problem, table) for table in TABLES}
     tables, units, typed, reading_faults = read_numbers(tables, parameter_set)
@@ -43,15 +46,15 @@ def normalise(**arguments: Any) -> dict[str, Any]:
         setattr(problem, table, {n: float(v) for n, v in getattr(problem, table).items()})
     problem.minimize, problem.maximize = (text and text.strip() for text in (problem.minimize, problem.maximize))
     problem.constraints = {n: text.strip() for n, text in problem.constraints.items()}
-    problem.pareto = tuple(text.strip() for text in problem.pareto)  # reports show it on one line
+    problem.pareto = tuple(text.strip() for text in problem.pareto)  # reports show each text on one line
     return complete_fields(**vars(problem))
 
 
 def complete_fields(**fields: Any) -> dict[str, Any]:
     """The complete fields of a problem, from fields with valid numbers and texts.
 
-    A range of one value becomes a fixed parameter. Start values of parameters that are not free are dropped. A complex
-    H gets a carrier for the ranges.
+    A range of one value becomes a fixed parameter. Start values of parameters that are not free are dropped. The model
+    of a complex H gets a carrier, a constant that is added to all eigenfrequencies, for the ranges.
     """
     free = fields["free"]
     single_values = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _MIN_WIDTH * max(abs(lo), abs(hi))}

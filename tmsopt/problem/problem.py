@@ -1,4 +1,4 @@
-"""A problem as data: `Problem` as stated, and `Posed` as solved."""
+"""A problem as data: `Problem` as the user states it, and `Posed` in the form that is solved."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -62,19 +62,20 @@ class Problem(_Fields):
         fixed: value per fixed parameter (radians, SI units).
         free: (least, greatest) value per free parameter.
         constraints: name → comparison of expressions, e.g. ``{"trail": "nu_H >= 0.02"}``.
-        minimize, maximize: an expression; at most one of the two.
-        pareto: two or three expressions to minimise at once; a minus sign maximises, ``"-lambda_s"``.
+        minimize, maximize: an expression; at most one of the two is given.
+        pareto: two or three expressions to minimise at once; a minus sign maximises, as in ``"-lambda_s"``.
         locate: name of a root pattern to realise, e.g. ``"EP4"``.
         start: start values for any of the free parameters.
         title: one line for reports.
-        scenarios: parameter → a `Band` or a list of values. Root quantities are the worst over them, and inequalities
-            hold at each. The nominal value is the one in `fixed`, or else the middle.
+        scenarios: parameter → a `Band` or a list of values. A root quantity is the worst over these values, and
+            inequalities hold at each of them. The nominal value is the one in `fixed`, or else the middle.
         tolerances: parameter → how far it may deviate either way, with the same effect.
         weights: parameter → size of a change that counts as 1 in the robustness radius; by default each parameter's
             own size.
         units: parameter → unit for reports; by default the unit of its text. Any number may be a text with a unit, such
             as ``free={"w": ("25 cm", "60 cm")}``, a constant such as ``"8/3"`` or ``"sqrt(2)/2 m"``, or a Fraction.
-        written: parameter → number → the exact number that was typed, if the number's decimal differs.
+        written: parameter → double → the exact number that was typed, such as ``8/3``, if the decimal of the double
+            differs from it.
 
     Raises:
         InputError: listing every fault with the accepted values.
@@ -126,7 +127,10 @@ class Problem(_Fields):
 
 @dataclass(frozen=True, eq=False)
 class Posed(_Fields):
-    """A problem as it is solved: numbers, parsed expressions, cases. Two are equal only if identical, for caches."""
+    """A problem in the form that is solved, with numbers, parsed expressions and cases.
+
+    Caches compare problems by identity: two are equal only if they are the same object.
+    """
 
     def derive(self, **changes: Any) -> "Posed":
         """The problem with some fields replaced, without checks. Numbers must be in rad and SI, and texts valid.
@@ -265,7 +269,7 @@ def _field_values(record: _Fields) -> dict[str, Any]:
 
 
 def radius_parameters(parameter_set: ParameterSet, weights: Numbers, fixed: Numbers) -> tuple[str, ...]:
-    """Parameters that change in the robustness radius; by default all that `Parameter.may_change` allows.
+    """Parameters that the robustness radius changes: those with a weight, or all that `Parameter.may_change` allows.
 
     Args:
         fixed: values of the parameters that are not free.

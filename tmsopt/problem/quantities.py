@@ -15,9 +15,12 @@ from tmsopt.records import AnyNumbers, Array
 from tmsopt.roots import Root, Structure, exact_roots, structure
 
 STRUCTURE_TOLERANCE = 1e-11
-"""Roots count as multiple if a relative change of the coefficients by this amount makes them so; optima need 1e-14."""
+"""Roots count as multiple if a relative change of the coefficients by this amount makes them multiple.
 
-SIMPLE = ("real", "pair", "undecided")
+At optima 1e-14 is enough.
+"""
+
+SIMPLE_STRUCTURES = ("real", "pair", "undecided")
 """Names of structures without multiple roots, whose roots are computed numerically."""
 
 _MAX_ERROR = 1e-11  # roots with a larger relative error are computed exactly
@@ -25,7 +28,7 @@ _ROUNDING = 4 * np.finfo(float).eps  # relative rounding error of a term of a po
 
 _DIGITS = 120  # decimal digits in which products of five doubles are exact
 
-_CACHE_SIZE = 64  # structures in the cache, because several quantities of a design use its structure
+_CACHE_SIZE = 64  # number of structures in the cache; several quantities of a design use the same structure
 
 _LARGEST_ROOT = 1e50
 """Greatest size of a root; products of a few larger roots overflow."""
@@ -37,7 +40,7 @@ def _may_have_huge_roots(a: Array) -> Any:
     if is_huge.any():
         with np.errstate(all="ignore"):
             sizes = np.abs(a[..., 1:] / a[..., :1]) ** (1 / np.arange(1, a.shape[-1]))
-        is_huge &= ~(sizes.max(axis=-1) < _LARGEST_ROOT)  # also true for nan, if all are 0
+        is_huge &= ~(sizes.max(axis=-1) < _LARGEST_ROOT)  # also true if all coefficients are 0: sizes are nan
     return is_huge
 
 
@@ -51,7 +54,9 @@ def _structure(values: AnyNumbers) -> Structure:
     if abs(a[0]) <= roundings[0] < math.inf:
         return undecided  # a0 may be 0 within rounding
     root_structure = _cached_structure(tuple(a), tuple(map(float, roundings)))
-    is_simple = root_structure.name in SIMPLE and all(root.multiplicity == 1 for root in root_structure.roots)
+    is_simple = root_structure.name in SIMPLE_STRUCTURES and all(
+        root.multiplicity == 1 for root in root_structure.roots
+    )
     if is_simple and _root_error(np.array(a), root_structure) > _MAX_ERROR:
         root_structure = replace(root_structure, roots=roots_at(*values.given) or root_structure.roots)
     return root_structure
@@ -70,19 +75,19 @@ def _cached_structure(a: tuple[float, ...], roundings: tuple[float, ...]) -> Str
 
 
 def roots_at(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) -> tuple[Root, ...]:
-    """Exact roots of the parameters as stored, rightmost first; none if a coefficient is undefined.
+    """Exact roots for parameters in double precision, rightmost first; none if a coefficient is undefined.
 
-    Coefficients have 120 digits, and roots are isolated in interval arithmetic.
+    The parameters count as exact, coefficients have 120 digits, and roots are isolated in interval arithmetic.
     """
     with flint.ctx.workdps(_DIGITS):
         exact_parameters = {name: flint.arb(value) for name, value in parameters.items()}
         coefficients = model.coefficients(exact_parameters, parameter_set)
     if not all(c.is_finite() for c in coefficients):
         return ()
-    leading = next((k for k, c in enumerate(coefficients) if c.mid() != 0), None)
-    if leading is None or leading == len(coefficients) - 1:
+    leading_index = next((k for k, c in enumerate(coefficients) if c.mid() != 0), None)
+    if leading_index is None or leading_index == len(coefficients) - 1:
         return ()
-    return exact_roots(coefficients[leading:])
+    return exact_roots(coefficients[leading_index:])
 
 
 def _damping_ratio(values: AnyNumbers) -> float:
@@ -112,12 +117,12 @@ ROOT_QUANTITIES = (
 STRUCTURE = Quantity("structure", "", "structure of the roots, multiple roots recognised", "", _structure)
 
 RADIUS = "radius"
-"""Distance to the nearest loss of stability in the problem's weights, from a separate search."""
+"""Distance to the nearest loss of stability, measured in the problem's weights; a separate search finds it."""
 
-_RADIUS = "robustness radius, the least change of the parameters, in their weights, after which it is unstable"
+_RADIUS_MEANING = "robustness radius, the least change of the parameters, in their weights, after which it is unstable"
 
-NO_RADIUS = Quantity(RADIUS, "1", _RADIUS, "r", lambda values: math.nan)
-"""The robustness radius as nan, until a search has found it."""
+NO_RADIUS = Quantity(RADIUS, "1", _RADIUS_MEANING, "r", lambda values: math.nan)
+"""The robustness radius, which is nan until a search has found it."""
 
 ROOT_NAMES = (*(q.name for q in ROOT_QUANTITIES), RADIUS)
 
@@ -137,8 +142,8 @@ def expand_names(text: str, parameter_set: ParameterSet) -> str:
 
 def regularise(coefficients: Array) -> Array:
     """Replace a leading coefficient near 0 by a small number, for a large root; rows with nan or inf become sⁿ."""
-    exist = np.all(np.isfinite(coefficients), axis=-1, keepdims=True)
-    a = np.where(exist, coefficients, np.eye(coefficients.shape[-1])[0])
+    is_finite = np.all(np.isfinite(coefficients), axis=-1, keepdims=True)
+    a = np.where(is_finite, coefficients, np.eye(coefficients.shape[-1])[0])
     size = np.abs(a).max(axis=-1, initial=0.0) + 1e-300
     return np.concatenate([np.where(_may_have_huge_roots(a), 1e-12 * size, a[..., 0])[..., None], a[..., 1:]], axis=-1)
 
@@ -149,11 +154,11 @@ def lifted_quantities(
     """The quantities in expressions that have an equation; proofs treat them as unknowns."""
     quantities: dict[str, Quantity] = {}
 
-    def note(quantity: Quantity, values: Values) -> None:
+    def collect(quantity: Quantity, values: Values) -> None:
         if quantity.equation is not None:
             quantities[quantity.name] = quantity
 
-    values = Values(model, parameter_set, parameters, lift=note).with_known(dict.fromkeys(ROOT_NAMES, math.nan))
+    values = Values(model, parameter_set, parameters, lift=collect).with_known(dict.fromkeys(ROOT_NAMES, math.nan))
     for expression in expressions:
         expression(values)
     return tuple(quantities.values())

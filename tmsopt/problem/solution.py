@@ -19,7 +19,8 @@ from tmsopt.problem.verdict.stability import STABLE, MultipleRoot, StabilityVerd
 from tmsopt.records import Printable, Table, call_documents, plain
 from tmsopt.roots import Root, Structure
 
-GAIN_DIGITS, SIDE_DIGITS = 6, 9
+_GAIN_DIGITS = 6  # digits of gains and violations in JSON
+_SIDE_DIGITS = 9  # digits of the best objective of each part of the box in JSON
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Bound:
         seconds: time of branch and bound.
         nodes: nodes of branch and bound.
         tolerance: feasibility tolerance of branch and bound, which proves in floating-point arithmetic.
-        solver: the solver that searched, such as ``SCIP``, even if the bound comes from elsewhere; empty without one.
+        solver: the solver that searched, such as ``SCIP``, even if another method gave the bound; empty without one.
 
     Example:
         >>> bound = tmsopt.solve("problems/ep4.toml").bound  # no abscissa is below -(a4/a0)^(1/4), which an EP4 attains
@@ -76,7 +77,8 @@ class Solution(Printable):
         status: ``optimal``, ``infeasible`` or ``not_converged``; always decided by an independent recheck.
         value: value of the objective expression; nan without one.
         parameters: every parameter of the set that the problem is written in (rad, SI units).
-        abscissa: largest real part of the roots of the ideal design, dimensionless (per √(w/g)).
+        abscissa: largest real part of the roots, dimensionless (per √(w/g)). Like `roots`, it belongs to the ideal
+            design, that is, to the design before its parameters are rounded to double precision.
         abscissa_realised: the abscissa of the parameters exactly as stored in double precision.
         roots: roots of the ideal design with multiplicities. They belong to the nearest polynomial with the structure,
             as `roots.enclosed.nearest` defines it; if all are simple, to the design's own polynomial.
@@ -84,15 +86,15 @@ class Solution(Printable):
         active: constraint or bound (``Fr.max``) → gain of the objective per unit of relaxation.
         violations: name → violation above tolerance, in the limit's units (rad, SI); for a pattern, relative to the
             coefficients.
-        missed: limit on the roots that the ideal design meets → amount by which the stored parameters miss it, in the
-            limit's units. Empty if doubles near the ideal design meet all limits, because these doubles are stored.
+        missed: limit on the roots that the ideal design meets → violation by the stored parameters, in the limit's
+            units. Empty if doubles near the ideal design meet all limits, because these doubles are stored.
         quantities: derived quantities; nan if undefined.
         dimensionless: the native parameters.
         formulation: ``abscissa``, ``matching`` or ``none``.
         freedom: count of parameters and conditions before solving.
         branches: other solutions of a square system.
         notes: sentences for the reader.
-        worst: with scenarios or tolerances, the case with the largest abscissa, which is reported.
+        worst: with scenarios or tolerances, the case with the largest abscissa; `abscissa` and `roots` belong to it.
         least_damped: with scenarios or tolerances, the case with the least damping ratio.
         fastest: with scenarios or tolerances, the case with the greatest angular frequency, if the problem uses it.
         cover: a bound on the roots over all cases, proven or not.
@@ -156,7 +158,7 @@ class Solution(Printable):
 
     @cached_property
     def analysis(self) -> Any:
-        """The further parts of a report, each computed on first use and kept."""
+        """The further parts of a report; each is computed on first use and kept."""
         return call_documents("analyse", self)
 
     @property
@@ -167,7 +169,10 @@ class Solution(Printable):
 
     @property
     def stable(self) -> bool | None:
-        """Whether all roots, ideal and as stored, are left of the axis in the worst case; None if one is infinite."""
+        """Whether all roots of the ideal design and of the stored parameters are left of the axis, in the worst case.
+
+        None if a root is infinite.
+        """
         verdict = self.stability.verdict
         return verdict == STABLE if verdict else None
 
@@ -242,7 +247,7 @@ class Solution(Printable):
         optional = {
             **{name: case and plain(case, "at offset") for name, case in cases.items()},
             **plain(self, "cover"),
-            "sides": plain(self.sides, digits=SIDE_DIGITS),
+            "sides": plain(self.sides, digits=_SIDE_DIGITS),
             **plain(self, "relaxation need interrupted si"),
         }
         return {
@@ -258,9 +263,9 @@ class Solution(Printable):
             **({"multiplicity_is_exact": False} if self.multiple_as_rounded else {}),
             **roots_to_json(self),
             **plain(self, "structure"),
-            "active": plain(self.active, digits=GAIN_DIGITS),
-            "violations": plain(self.violations, digits=GAIN_DIGITS),
-            **({"missed_as_stored": plain(self.missed, digits=GAIN_DIGITS)} if self.missed else {}),
+            "active": plain(self.active, digits=_GAIN_DIGITS),
+            "violations": plain(self.violations, digits=_GAIN_DIGITS),
+            **({"missed_as_stored": plain(self.missed, digits=_GAIN_DIGITS)} if self.missed else {}),
             **plain(self, "bound"),
             "starts": plain(self.starts, "tried converged at_best expected_unseen"),
             "looked": self.starts.looked,

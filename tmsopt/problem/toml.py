@@ -13,9 +13,13 @@ from tmsopt.errors import LISTED, Fault, InputError, short
 from tmsopt.files import as_path, read_text
 from tmsopt.problem.advice.lines import suggest_line
 
-MOST_PARTS, MOST_DEEP, LONGEST_WORD = 10, 50, 1000
-"""Greatest number of parts of a dotted key, depth of lists and tables, length of a number or an unquoted name."""
+MAX_KEY_PARTS = 10
+"""Greatest number of parts of a dotted key."""
 
+MAX_DEPTH = 50
+"""Greatest depth of lists and tables."""
+
+_MAX_WORD_LENGTH = 1000  # greatest number of characters of a number or of a name without quotes
 _MAX_EXPLAINED = 10 * LISTED  # greatest number of explained error messages of pydantic; a key may have several
 
 Number = StrictFloat | StrictInt | StrictStr
@@ -48,7 +52,7 @@ class Page:
     lines: Mapping[Key, int]
 
     def error(self, faults: Iterable[Fault]) -> InputError:
-        """The faults in the order of their lines; a fault without a file is located in this one."""
+        """The error with the faults in the order of their lines; a fault without a file is located in this file."""
         located_faults = [f if f.file else f.at(self.file, self._line_of(f.key)) for f in faults]
         return InputError(sorted(located_faults, key=lambda f: f.line))
 
@@ -72,38 +76,40 @@ def read_page(path: str | PathLike[str], kind: str) -> Page:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        place = re.search(r"line (\d+)", str(error))
-        line = scan.unclosed or (int(place[1]) if place else text.count("\n") + 1)
-        written = "".join(text.split("\n")[line - 1 : line])  # empty at the end of the file
-        raise InputError([Fault(f"not TOML: {error}{suggest_line(written)}").at(file, line)]) from None
+        match = re.search(r"line (\d+)", str(error))
+        line = scan.unclosed_line or (int(match[1]) if match else text.count("\n") + 1)
+        line_text = "".join(text.split("\n")[line - 1 : line])  # empty at the end of the file
+        raise InputError([Fault(f"not TOML: {error}{suggest_line(line_text)}").at(file, line)]) from None
     return Page(file, data, scan.lines)
 
 
 def validate_tables(
     data: Tables, schema: type[S], explain: Callable[[tuple[int | str, ...], str, Any], Fault]
 ) -> tuple[list[Fault], S | None]:
-    """The faults in the types and keys of the data, and the data without the faulty keys; None if that fails.
+    """The faults in the types and keys of the data, and the data without the faulty keys.
+
+    The data are None if they do not fit the schema without these keys either.
 
     Args:
-        explain: turns the place, kind and value of an error message of pydantic into a fault in the words of the file.
+        explain: turns the location, kind and value of a pydantic error into a fault in the words of the file.
     """
     faults: dict[Key, Fault] = {}
-    pruned: dict[str, Any] = dict(data)
+    remaining_data: dict[str, Any] = dict(data)
     for _ in range(2):
         try:
-            return list(faults.values()), schema.model_validate(pruned)
+            return list(faults.values()), schema.model_validate(remaining_data)
         except ValidationError as error:
-            complaints = error.errors(include_url=False, include_context=False)
-            explained = [explain(d["loc"], d["type"], d["input"]) for d in complaints[:_MAX_EXPLAINED]]
-            remaining_keys = dict.fromkeys(tuple(map(str, d["loc"][:2])) for d in complaints[_MAX_EXPLAINED:])
-            explained += [Fault("accepted: see the other faults", key) for key in remaining_keys]
-            deepest: dict[Key, int] = {}
-            for fault in explained:
-                deepest[fault.key[:2]] = max(len(fault.key), deepest.get(fault.key[:2], 0))
-            for fault in explained:
-                if len(fault.key) == deepest[fault.key[:2]]:
+            errors = error.errors(include_url=False, include_context=False)
+            new_faults = [explain(d["loc"], d["type"], d["input"]) for d in errors[:_MAX_EXPLAINED]]
+            remaining_keys = dict.fromkeys(tuple(map(str, d["loc"][:2])) for d in errors[_MAX_EXPLAINED:])
+            new_faults += [Fault("accepted: see the other faults", key) for key in remaining_keys]
+            max_depths: dict[Key, int] = {}
+            for fault in new_faults:
+                max_depths[fault.key[:2]] = max(len(fault.key), max_depths.get(fault.key[:2], 0))
+            for fault in new_faults:
+                if len(fault.key) == max_depths[fault.key[:2]]:
                     faults.setdefault(fault.key, fault)
-        pruned = _drop_keys(pruned, {key[:2] for key in faults})
+        remaining_data = _drop_keys(remaining_data, {key[:2] for key in faults})
     return list(faults.values()), None
 
 
@@ -121,21 +127,23 @@ _TOKEN = re.compile(
 )
 """Matches a token. Possessive quantifiers give linear time for any text. An unclosed string ends with the file."""
 
-_MARKS = frozenset("[]{}=.,")
+_PUNCTUATION = frozenset("[]{}=.,")
+
 _STATEMENT = re.compile(r"[ \t]*+(?:[\w.\-\"' \t]++=|\[[A-Za-z_][\w.]*+\][ \t]*+(?:\#[^\n]*+)?$)", re.MULTILINE)
+"""Matches the beginning of a line with a key or a section."""
 
 
 @dataclass
 class _Scan:
-    """What a scan finds in a file before it is parsed: the lines of keys, and a fault that prevents parsing.
+    """The result of a scan before a file is parsed: the lines of keys, and a fault that prevents parsing.
 
     Attributes:
         lines: section or key → number of its line, except inside lists and multi-line strings.
-        unclosed: line of a list that is still open where another key or section begins; 0 for none.
+        unclosed_line: line of a list that is still open where another key or section begins; 0 for none.
     """
 
     lines: dict[Key, int] = field(default_factory=dict)
-    unclosed: int = 0
+    unclosed_line: int = 0
     fault: Fault | None = None
 
 
@@ -145,22 +153,23 @@ def _scan_lines(text: str) -> _Scan:
     section: Key = ()
     line, statement_line, depth, key_parts = 1, 1, 0, 0
     head: list[str] | None = []  # parts of the current section or key; None inside a value
-    end = previous_token = "="  # end of the head, "]" for a section; the previous token
+    head_end = "="  # the token after the head: "=" for a key, "]" for a section
+    previous_token = ""
     for match in _TOKEN.finditer(text):
         token = match[0]
         if token == "\n":
             if depth == 0:
-                head, end, statement_line = [], "=", line + 1
-            elif not scan.unclosed and _STATEMENT.match(text, match.end()):
-                scan.unclosed = statement_line
-        elif token in _MARKS:
+                head, head_end, statement_line = [], "=", line + 1
+            elif not scan.unclosed_line and _STATEMENT.match(text, match.end()):
+                scan.unclosed_line = statement_line
+        elif token in _PUNCTUATION:
             if head is None:
                 depth = max(0, depth + (token in "[{") - (token in "]}"))
             elif token == "[" and not head:
-                end = "]"
-            elif token == end:
+                head_end = "]"
+            elif token == head_end:
                 key = tuple(head)
-                section, key = (key, key) if end == "]" else (section, (*section, *key))
+                section, key = (key, key) if head_end == "]" else (section, (*section, *key))
                 scan.lines.setdefault(key, line)
                 head = None
         elif token[0] != "#":
@@ -172,17 +181,17 @@ def _scan_lines(text: str) -> _Scan:
             break
         line += token.count("\n")
         previous_token = token
-    scan.unclosed = scan.unclosed or (statement_line if depth else 0)
+    scan.unclosed_line = scan.unclosed_line or (statement_line if depth else 0)
     return scan
 
 
 def _size_problem(token: str, parts: int, depth: int) -> str:
     """The message for a key, depth or word above its limit; empty if all are within the limits."""
-    if parts > MOST_PARTS:
-        return f"found a key of more than {MOST_PARTS} parts; accepted: up to {MOST_PARTS}"
-    if depth > MOST_DEEP:
-        return f"found lists or tables more than {MOST_DEEP} deep; accepted: up to {MOST_DEEP}"
-    if len(token) > LONGEST_WORD and token[0] not in "\"'#":
-        accepted = f"numbers, and names without quotes, of up to {LONGEST_WORD}"
+    if parts > MAX_KEY_PARTS:
+        return f"found a key of more than {MAX_KEY_PARTS} parts; accepted: up to {MAX_KEY_PARTS}"
+    if depth > MAX_DEPTH:
+        return f"found lists or tables more than {MAX_DEPTH} deep; accepted: up to {MAX_DEPTH}"
+    if len(token) > _MAX_WORD_LENGTH and token[0] not in "\"'#":
+        accepted = f"numbers, and names without quotes, of up to {_MAX_WORD_LENGTH}"
         return f"found {len(token)} characters, {short(token)}; accepted: {accepted}"
     return ""

@@ -1,4 +1,4 @@
-"""Finds the units of the parameters, quantities and expressions of a problem, as its author wrote them."""
+"""Finds the units of the parameters, quantities and expressions of a problem, as its author typed them."""
 
 import math
 import re
@@ -13,7 +13,7 @@ from tmsopt.problem.limit import split_limit
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.problem.units import Dimension, dimension, unit_factor
-from tmsopt.problem.validate import SMALLEST
+from tmsopt.problem.validate import MIN_SIZE
 from tmsopt.records import AnyNumbers, Numbers
 
 _PER_SECOND = "1/s"
@@ -26,11 +26,11 @@ class Unit:
 
     Attributes:
         text: its name, such as ``km/h``; empty without one.
-        one: number of stored units (SI, rad) in one of this unit: 0.01 for cm.
+        factor: a number in this unit, times this factor, is the stored number (SI, rad): 0.01 for cm.
     """
 
     text: str = ""
-    one: float = 1.0
+    factor: float = 1.0
 
     def number(self, value: float, digits: int = 5, error: float = 0.0) -> str:
         """A number in this unit as text, without the unit; ``none`` if it is not finite.
@@ -41,11 +41,11 @@ class Unit:
         """
         if not math.isfinite(value):
             return "none"
-        if abs(value) <= max(error, SMALLEST):
+        if abs(value) <= max(error, MIN_SIZE):
             return "0"
         if error > 0:
             digits = min(digits, max(math.floor(math.log10(abs(value))) - math.floor(math.log10(error)), 1))
-        return f"{value / self.one + 0.0:.{digits}g}"
+        return f"{value / self.factor + 0.0:.{digits}g}"
 
     def show(self, value: float, digits: int = 5) -> str:
         """A number with this unit as text."""
@@ -71,7 +71,7 @@ def unit_of(problem: Posed, text: str) -> Unit:
 
 
 def rate_of(problem: Posed, text: str, parameters: AnyNumbers) -> Any:
-    """The factor from √(g/w) to 1/s for an expression in √(g/w); None for other units or without a unit of time.
+    """The factor from √(g/w) to 1/s for an expression in √(g/w); None for other units and for sets without seconds.
 
     Args:
         parameters: a design, or arrays of designs.
@@ -89,16 +89,17 @@ def unit_at(problem: Posed, text: str, parameters: Numbers) -> Unit:
     return unit_of(problem, text) if rate is None else Unit(_PER_SECOND, 1 / float(rate))
 
 
-def common_unit(problem: Posed, text: str, common: Numbers | None = None) -> Unit:
-    """The unit of `unit_at` if it is the same at all designs, for bounds and differences; else that of `unit_of`.
+def common_unit(problem: Posed, text: str, shared_parameters: Numbers | None = None) -> Unit:
+    """The unit for bounds and differences of designs: by `unit_at` if it is the same for all, else by `unit_of`.
 
     Args:
-        common: parameters that these designs share; by default the fixed ones without scenario or tolerance.
+        shared_parameters: parameters that the designs share; by default all fixed ones without scenario or tolerance.
     """
-    if common is None:
-        common = {n: x for n, x in problem.fixed.items() if n not in {*problem.scenarios, *problem.tolerances}}
+    if shared_parameters is None:
+        varied_names = {*problem.scenarios, *problem.tolerances}
+        shared_parameters = {n: x for n, x in problem.fixed.items() if n not in varied_names}
     try:
-        return unit_at(problem, text, common)
+        return unit_at(problem, text, shared_parameters)
     except KeyError:
         return unit_of(problem, text)
 
@@ -169,7 +170,7 @@ def _usual_unit(problem: Posed, dimension: Dimension) -> Unit:
     return _make_unit(typed_units.most_common(1)[0][0] if typed_units else "", unit)
 
 
-def _make_unit(written: str, unit: str) -> Unit:
+def _make_unit(typed_unit: str, unit: str) -> Unit:
     if unit == "1":
         return Unit()
-    return Unit(written, unit_factor(written, unit)) if written else Unit(unit)
+    return Unit(typed_unit, unit_factor(typed_unit, unit)) if typed_unit else Unit(unit)

@@ -15,25 +15,24 @@ from tmsopt.problem.cases import Band, points_of
 from tmsopt.problem.quantities import expand_names, root_names
 from tmsopt.records import AnyNumbers
 
-VARIATIONS = ("scenarios", "tolerances", "weights")
-"""Tables of a problem that name parameters, in addition to `fixed` and `free`."""
+EXTRA_PARAMETER_TABLES = ("scenarios", "tolerances", "weights")
+"""Tables of a problem that name parameters and are not `fixed`, `free` or `start`."""
 
-SMALLEST = 1e-50
+MIN_SIZE = 1e-50
 """Least size of a nonzero parameter; its inverse is the greatest."""
 
-MOST_TOLERANCES = 8
+_MAX_TOLERANCES = 8
 """Greatest number of tolerances; their box has 256 corners."""
 
-MOST_ENTRIES = {"constraints": 1000, "scenarios": 100}
-"""Greatest number of constraints of a problem, and of values of a scenario."""
+_MAX_ENTRIES = {"constraints": 1000, "scenarios": 100}
+"""Table → greatest number of entries: constraints of a problem, or values of a scenario."""
 
-_MAX_PATTERN_NAME = 200  # characters of the name of a pattern
+_MAX_PATTERN_LENGTH = 200  # greatest number of characters of the name of a pattern
 
-Stated = Any
-"""A problem as stated; any field may have any type."""
+StatedProblem = Any
+"""A problem as the user stated it; any field may have any type."""
 
-
-_TABLES = {
+_TABLE_EXAMPLES = {
     "fixed": "{'mu': 0.1}",
     "free": "{'Fr': (0.1, 5)}",
     "constraints": "{'trail': 'nu_H >= 0.02'}",
@@ -44,15 +43,15 @@ _TABLES = {
     "units": "{'v': 'km/h'}",
     "written": "{'v': {2.6666666666666665: '8/3'}}",
 }
-"""Arguments that are tables, each with an example."""
+"""Argument that is a table → an example of it."""
 
 
-def shape_faults(problem: Stated) -> Iterator[Fault]:
+def shape_faults(problem: StatedProblem) -> Iterator[Fault]:
     """Faults of arguments that have a wrong type, and of tables that are too large."""
     if not isinstance(problem.model, Model):
         accepted = "a model, such as tmsopt.models.tms"
         yield Fault(f"found {type(problem.model).__name__}; accepted: {accepted}", ("model",))
-    for name, example in _TABLES.items():
+    for name, example in _TABLE_EXAMPLES.items():
         yield from table_faults(name, getattr(problem, name), example)
     if isinstance(problem.constraints, Mapping):
         yield from _size_faults("constraints", problem.constraints, "constraints")
@@ -64,21 +63,23 @@ def shape_faults(problem: Stated) -> Iterator[Fault]:
     yield from text_faults(problem.title, "title")
 
 
-def _size_faults(what: str, values: Any, *key: str) -> Iterator[Fault]:
-    if isinstance(values, Sequence | Mapping) and not isinstance(values, str) and len(values) > MOST_ENTRIES[what]:
-        yield Fault(f"found {len(values)}; accepted: up to {MOST_ENTRIES[what]}", key)
+def _size_faults(table: str, values: Any, *key: str) -> Iterator[Fault]:
+    if isinstance(values, Sequence | Mapping) and not isinstance(values, str) and len(values) > _MAX_ENTRIES[table]:
+        yield Fault(f"found {len(values)}; accepted: up to {_MAX_ENTRIES[table]}", key)
 
 
-def find_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
+def find_faults(problem: StatedProblem, parameter_set: ParameterSet) -> Iterator[Fault]:
     """Every fault of a problem in the parameters of a set; the arguments must have the right types."""
-    checks = (_name_faults, _value_faults, _need_faults, _variation_faults, _objective_faults, _expression_faults)
+    checks = (_name_faults, _value_faults, _need_faults, _extra_table_faults, _objective_faults, _expression_faults)
     return chain.from_iterable(check(problem, parameter_set) for check in checks)
 
 
-def _name_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
+def _name_faults(problem: StatedProblem, parameter_set: ParameterSet) -> Iterator[Fault]:
     other_sets = {n: s.name for s in problem.model.sets if s is not parameter_set for n in s.names}
     advice = limit_advice(suggest_name)
-    tables = {"parameters": {**problem.fixed, **problem.free}} | {t: getattr(problem, t) for t in VARIATIONS}
+    tables = {"parameters": {**problem.fixed, **problem.free}} | {
+        t: getattr(problem, t) for t in EXTRA_PARAMETER_TABLES
+    }
     for table, name in ((t, n) for t, names in tables.items() for n in names if n not in parameter_set.names):
         message = f"unknown parameter {short(name)}; "
         if name in other_sets:
@@ -93,16 +94,18 @@ def _name_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault
         if name in problem.free:
             yield Fault(f"'{name}' is both fixed and free; keep one", ("parameters", name))
     given_names = tables["parameters"].keys() | problem.scenarios
-    if missing := [p.name for p in parameter_set.parameters if p.name not in given_names and p.default is None]:
-        example = " or ".join(example_of(parameter_set[missing[0]]))
-        explanations = "".join(f"; {AMBIGUOUS_NAMES[name]}" for name in missing if name in AMBIGUOUS_NAMES)
-        yield Fault(f"missing parameter {', '.join(missing)}; write e.g. {example}{explanations}", ("parameters",))
+    if missing_names := [p.name for p in parameter_set.parameters if p.name not in given_names and p.default is None]:
+        example = " or ".join(example_of(parameter_set[missing_names[0]]))
+        explanations = "".join(f"; {AMBIGUOUS_NAMES[name]}" for name in missing_names if name in AMBIGUOUS_NAMES)
+        yield Fault(
+            f"missing parameter {', '.join(missing_names)}; write e.g. {example}{explanations}", ("parameters",)
+        )
     for name in problem.start:
         if name not in problem.free:
             yield Fault(f"found a start for '{name}'; accepted: free parameters", ("parameters", name, "start"))
 
 
-def _value_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
+def _value_faults(problem: StatedProblem, parameter_set: ParameterSet) -> Iterator[Fault]:
     for name in parameter_set.names:
         key = ("parameters", name)
         if name in problem.fixed:
@@ -131,18 +134,18 @@ def _ends_faults(parameter_set: ParameterSet, name: str, ends: AnyNumbers, *key:
     return faults
 
 
-def _need_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
-    """Faults of parameters that may differ from 0 while another parameter, which they need, may be 0."""
+def _need_faults(problem: StatedProblem, parameter_set: ParameterSet) -> Iterator[Fault]:
+    """Faults of parameters that may differ from 0 although another parameter, which they need, may be 0."""
     for name, (needed_name, reason) in parameter_set.needs.items():
-        least = min(_possible_values(problem, parameter_set, needed_name), default=1.0)
-        if least <= 0 and any(_possible_values(problem, parameter_set, name)):
+        least_needed = min(_possible_values(problem, parameter_set, needed_name), default=1.0)
+        if least_needed <= 0 and any(_possible_values(problem, parameter_set, name)):
             message = (
                 f"{needed_name} may be 0 while {name} is not: {reason}; keep {needed_name} above 0, or leave {name} out"
             )
             yield Fault(message, ("parameters", needed_name))
 
 
-def _possible_values(problem: Stated, parameter_set: ParameterSet, name: str) -> list[float]:
+def _possible_values(problem: StatedProblem, parameter_set: ParameterSet, name: str) -> list[float]:
     """Extreme values of a parameter: ends of its range, scenario points, or its fixed value; empty if not numeric."""
     try:
         values = problem.free.get(name) or points_of(problem.scenarios.get(name, ()))
@@ -151,7 +154,8 @@ def _possible_values(problem: Stated, parameter_set: ParameterSet, name: str) ->
         return []
 
 
-def _variation_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
+def _extra_table_faults(problem: StatedProblem, parameter_set: ParameterSet) -> Iterator[Fault]:
+    """Faults of scenarios, tolerances and weights."""
     for name, scenario in problem.scenarios.items():
         if name in parameter_set.names:
             yield from _scenario_faults(problem, parameter_set, name, scenario)
@@ -159,18 +163,18 @@ def _variation_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[
         for name, value in getattr(problem, table).items():
             if name not in parameter_set.names:
                 continue
-            size = _number(value)
+            size = _as_float(value)
             if not _has_usable_size(size) or size < 0 or (size == 0 and table == "tolerances"):
-                sizes = f"a number {accepted}, of a size from {SMALLEST:g} to {1 / SMALLEST:g}"
+                sizes = f"a number {accepted}, of a size from {MIN_SIZE:g} to {1 / MIN_SIZE:g}"
                 yield Fault(f"found {short(value)}; accepted: {sizes}", (table, name))
             elif table == "tolerances":
                 yield from _tolerance_faults(problem, parameter_set, name, size)
-    if (count := len(problem.tolerances)) > MOST_TOLERANCES:
-        message = f"found {count} tolerances; accepted: up to {MOST_TOLERANCES}; keep those that matter most"
+    if (count := len(problem.tolerances)) > _MAX_TOLERANCES:
+        message = f"found {count} tolerances; accepted: up to {_MAX_TOLERANCES}; keep those that matter most"
         yield Fault(message, ("tolerances",))
 
 
-def _scenario_faults(problem: Stated, parameter_set: ParameterSet, name: str, scenario: Any) -> Iterator[Fault]:
+def _scenario_faults(problem: StatedProblem, parameter_set: ParameterSet, name: str, scenario: Any) -> Iterator[Fault]:
     key = ("scenarios", name)
     if name in problem.free:
         yield Fault(f"'{name}' is both free and in scenarios; keep one", key)
@@ -185,19 +189,21 @@ def _scenario_faults(problem: Stated, parameter_set: ParameterSet, name: str, sc
             yield from _number_faults(parameter_set, name, value, *key)
 
 
-def _tolerance_faults(problem: Stated, parameter_set: ParameterSet, name: str, tolerance: float) -> Iterator[Fault]:
+def _tolerance_faults(
+    problem: StatedProblem, parameter_set: ParameterSet, name: str, tolerance: float
+) -> Iterator[Fault]:
     """Faults of a tolerance that exceeds the physical range of its parameter."""
     parameter, ends = parameter_set[name], _possible_values(problem, parameter_set, name)
     for value in (min(ends) - tolerance, max(ends) + tolerance) if ends else ():
         if value not in parameter.range:
             message = (
                 f"with the tolerance {tolerance:.6g}, {name} reaches {value:.6g}, which is not physical: "
-                f"{parameter.meaning} is {parameter.range}; keep {name} off the end of its range by the tolerance"
+                f"{parameter.meaning} is {parameter.range}; keep {name} away from the end of its range by the tolerance"
             )
             yield Fault(message, ("tolerances", name))
 
 
-def _number(value: Any) -> float:
+def _as_float(value: Any) -> float:
     """A value as a float; nan if it is not a number."""
     try:
         return math.nan if isinstance(value, bool | str) else float(value)
@@ -207,25 +213,28 @@ def _number(value: Any) -> float:
 
 def _has_usable_size(number: float) -> bool:
     """Whether a number is 0, or of a size at which products of a few numbers do not overflow or underflow."""
-    return number == 0 or SMALLEST <= abs(number) <= 1 / SMALLEST
+    return number == 0 or MIN_SIZE <= abs(number) <= 1 / MIN_SIZE
 
 
 def _number_faults(parameter_set: ParameterSet, name: str, value: Any, *key: str) -> Iterator[Fault]:
-    parameter, number = parameter_set[name], _number(value)
+    parameter, number = parameter_set[name], _as_float(value)
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     if not math.isfinite(number):
         yield Fault(f"found {short(value)}; accepted: a finite number{unit and ' in' + unit}", key)
     elif not _has_usable_size(number):
-        yield Fault(f"found {number:g}; accepted: 0, or a size from {SMALLEST:g} to {1 / SMALLEST:g}{unit}", key)
+        yield Fault(
+            f"found {number:g}; accepted: 0, or a size from {MIN_SIZE:g} to {1 / MIN_SIZE:g}{unit}",
+            key,
+        )
     elif number not in parameter.range:
         hint = f'; write "{number:.6g} deg" for degrees' if parameter.unit == "rad" and abs(number) < 90 else ""
         if -number in parameter.range and parameter.meaning.endswith("downward"):
-            hint = f"; z points down: write {-number:.6g}{unit} for what is above the ground"
+            hint = f"; z points down: write {-number:.6g}{unit} for a point above the ground"
         message = f"{name} = {number:.6g}{unit} is not physical; {parameter.meaning} is {parameter.range}{unit}{hint}"
         yield Fault(message, key)
 
 
-def _objective_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
+def _objective_faults(problem: StatedProblem, parameter_set: ParameterSet) -> Iterator[Fault]:
     key = ("objective",)
     senses = [sense for sense in ("minimize", "maximize") if getattr(problem, sense) is not None]
     if len(senses) > 1:
@@ -241,7 +250,7 @@ def _objective_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[
         yield from _pattern_faults(problem.locate, problem.model, (*key, "locate"))
 
 
-def _list_pareto(problem: Stated) -> Sequence[Any] | None:
+def _list_pareto(problem: StatedProblem) -> Sequence[Any] | None:
     """The expressions of a front; None if they are no list."""
     texts = problem.pareto
     return texts if isinstance(texts, Sequence) and not isinstance(texts, str) else None
@@ -249,7 +258,7 @@ def _list_pareto(problem: Stated) -> Sequence[Any] | None:
 
 def _pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[Fault]:
     try:
-        if not isinstance(name, str) or len(name) > _MAX_PATTERN_NAME:
+        if not isinstance(name, str) or len(name) > _MAX_PATTERN_LENGTH:
             raise ValueError(f"{short(name)} is no pattern")
         data_name = dict(zip(model.words, ("weave", "capsize"), strict=True)).get(name, name)
         if data_name != name and data_name in patterns_of(model):
@@ -261,7 +270,7 @@ def _pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[F
         yield Fault(f"unknown pattern: {error}; {suggest(str(name), patterns_of(model))}{hint}", key)
 
 
-def _expression_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator[Fault]:
+def _expression_faults(problem: StatedProblem, parameter_set: ParameterSet) -> Iterator[Fault]:
     accepted = (*parameter_set.names, *public_names(problem.model, parameter_set), *root_names(problem.model))
     advice = limit_advice(suggest_name)
 
@@ -275,7 +284,9 @@ def _expression_faults(problem: Stated, parameter_set: ParameterSet) -> Iterator
             yield Fault(str(error), key)
 
     texts = {"minimize": [problem.minimize], "maximize": [problem.maximize], "pareto": _list_pareto(problem) or ()}
-    for sense, text in ((s, t) for s, listed in texts.items() for t in listed if t is not None or s == "pareto"):
-        yield from parse_faults(parse_value, text, "objective", sense)
+    for sense, sense_texts in texts.items():
+        for text in sense_texts:
+            if text is not None or sense == "pareto":
+                yield from parse_faults(parse_value, text, "objective", sense)
     for name, text in problem.constraints.items():
         yield from parse_faults(parse_comparison, text, "constraints", name)

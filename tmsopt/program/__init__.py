@@ -1,7 +1,7 @@
 """A design problem as a smooth nonlinear program (NLP), and IPOPT on it.
 
 Roots enter through polynomial factors, not through eigenvalues. `formulate` writes the NLP of a `Problem`; `nlp` holds
-it as plain data; `ipopt` alone calls the solver; `starts` chooses where to begin.
+it as plain data; only `ipopt` calls IPOPT; `starts` chooses the starting points.
 """
 
 import lazy_loader

@@ -22,22 +22,22 @@ class DesignScores:
     """Worst-case values of designs, from numeric roots; near multiple roots they are approximate.
 
     Attributes:
-        worth: the objective, for which smaller is better; nan for a design with a singular mass matrix or coefficients
-            that are not finite; None for a problem without objective.
-        beyond: excess over each limit, negative if the limit holds; for an equality, the left side minus the right
-            side. Shape (limits, …).
-        equal: which limits are equalities, shape (limits,).
+        objective: the objective with its sign, so that smaller is better; nan for a design with a singular mass matrix
+            or coefficients that are not finite; None for a problem without objective.
+        signed_excess: excess over each limit, negative if the limit holds; for an equality, the left side minus the
+            right side. Shape (limits, …).
+        is_equality: whether a limit is an equality, shape (limits,).
     """
 
-    worth: Array | None
-    beyond: Array
-    equal: NDArray[np.bool_]
+    objective: Array | None
+    signed_excess: Array
+    is_equality: NDArray[np.bool_]
 
     @property
     def excess(self) -> Array:
         """Violation of each limit, ≥ 0; inf for a limit whose value is not a number."""
-        is_equality = self.equal.reshape(-1, *[1] * (self.beyond.ndim - 1))
-        amount = np.where(is_equality, np.abs(self.beyond), np.maximum(self.beyond, 0.0))
+        is_equality = self.is_equality.reshape(-1, *[1] * (self.signed_excess.ndim - 1))
+        amount = np.where(is_equality, np.abs(self.signed_excess), np.maximum(self.signed_excess, 0.0))
         return np.where(np.isnan(amount), np.inf, amount)
 
 
@@ -60,17 +60,17 @@ def score_designs(problem: Posed, columns: Mapping[str, Array]) -> DesignScores:
     a, names = coefficients_of(problem, parameters), {n for e in expressions for n in e.names}
     # As in the recheck, all coefficients must be finite and the mass matrix nonsingular.
     has_dynamics = np.broadcast_to(reduce(np.logical_and, map(np.isfinite, a), a[0] != 0), shape_of_cases)
-    worst = {}
+    worst_values = {}
     for name, x in roots_of(a, {*names, "abscissa"} if _RATIO in names else names).items():
         sign = WORSE_DIRECTION[name]
-        worst[name] = sign * np.broadcast_to(sign * x, shape_of_cases).max(axis=0)
-    values = dict(zip(expressions, evaluate(problem, expressions, parameters | worst), strict=True))
+        worst_values[name] = sign * np.broadcast_to(sign * x, shape_of_cases).max(axis=0)
+    values = dict(zip(expressions, evaluate(problem, expressions, parameters | worst_values), strict=True))
     equalities = [c for c in conditions if c.equality]
     if cases and equalities:  # an equality is required of the nominal design only
-        values |= zip(equalities, evaluate(problem, equalities, nominal | worst), strict=True)
+        values |= zip(equalities, evaluate(problem, equalities, nominal | worst_values), strict=True)
 
     def grade(e: Expression, sign: float) -> Array:
-        return np.asarray(np.where(has_dynamics, _grade(e, sign, values[e], worst), np.nan).max(axis=0))
+        return np.asarray(np.where(has_dynamics, _grade(e, sign, values[e], worst_values), np.nan).max(axis=0))
 
     return DesignScores(
         None if problem.objective is None else grade(problem.objective, problem.sign),
@@ -79,10 +79,10 @@ def score_designs(problem: Posed, columns: Mapping[str, Array]) -> DesignScores:
     )
 
 
-def _grade(expression: Expression, sign: float, value: Array, worst: Mapping[str, Array]) -> Array:
+def _grade(expression: Expression, sign: float, value: Array, worst_values: Mapping[str, Array]) -> Array:
     """The value with its sign, so that smaller is better, plus the abscissa for a damping ratio of −1.
 
-    The ratio is −1 for every design with a positive real root, so that only the abscissa can compare such designs.
+    Every design with a positive real root has the damping ratio −1, so that only the abscissa can compare such designs.
     """
     grade = sign * value
     if expression.names != (_RATIO,) or expression.equality:
@@ -90,9 +90,9 @@ def _grade(expression: Expression, sign: float, value: Array, worst: Mapping[str
     lowest, next_lowest = (sign * float(expression({_RATIO: ratio})) for ratio in (-1.0, -0.9))
     if next_lowest >= lowest or (expression.comparison and lowest <= 0):
         return grade
-    return np.where(worst[_RATIO] <= -1, grade + worst["abscissa"], grade)
+    return np.where(worst_values[_RATIO] <= -1, grade + worst_values["abscissa"], grade)
 
 
-def _stack_cases(each: Sequence[Any], axes: int) -> Array:
+def _stack_cases(case_values: Sequence[Any], axis_count: int) -> Array:
     """The values of one parameter in all cases, stacked along a first axis."""
-    return np.stack([x.reshape(x.shape or (1,) * axes) for x in np.broadcast_arrays(*each)])
+    return np.stack([x.reshape(x.shape or (1,) * axis_count) for x in np.broadcast_arrays(*case_values)])

@@ -29,6 +29,7 @@ from tmsopt.program.boundary_points import lift_boundary_points, lift_displaceme
 from tmsopt.program.kinks import epigraph_form
 from tmsopt.program.lifts import (
     LiftedQuantity,
+    guess_worst_value,
     lift_abscissa,
     lift_angular_frequency,
     lift_damping_ratio,
@@ -36,7 +37,6 @@ from tmsopt.program.lifts import (
     lift_quantity,
     lift_radius,
     lift_real_roots,
-    worst_guess,
 )
 from tmsopt.program.nlp import (
     NLP,
@@ -53,10 +53,10 @@ from tmsopt.records import Table
 from tmsopt.roots import Pattern
 
 LiftFunction = Callable[["Builder"], LiftedQuantity]
-"""Adds the variables and rows of a root quantity: its worst value over all cases except those of a radius."""
+"""Adds the variables and rows of a root quantity, the worst value over all cases except the cases of a radius."""
 
-LIMIT = ".limit"
-"""The limit of a constraint `x` is the number `x.limit`."""
+_LIMIT_SUFFIX = ".limit"
+"""The limit of a constraint `x` is a number of the NLP with the name `x.limit`."""
 
 _LEEWAY = 1e-9  # max(x, constant): the constant is lowered by this, because a limit may have the same value
 
@@ -66,7 +66,7 @@ def formulate(
     cases: Sequence[Case] = (),
     elastic: bool = False,
     damping_ratio: float | None = None,
-    lead: int = 0,
+    a0_sign: int = 0,
 ) -> NLP:
     """Formulate a problem by its pattern, or without a pattern by factors. Each max, min and abs becomes a variable.
 
@@ -75,10 +75,12 @@ def formulate(
         elastic: keep every constraint as a row, so that it can be relaxed.
         damping_ratio: fix the damping ratio at 1 (all roots real and negative) or −1 (a positive real root). The
             recheck of the solution tests whether it has this damping ratio.
-        lead: +1 allows a0 >= 0, −1 allows a0 <= 0, 0 excludes a0 = 0.
+        a0_sign: +1 allows a0 >= 0, −1 allows a0 <= 0, 0 excludes a0 = 0.
     """
-    matched = formulate_matching(problem, cases=cases) if problem.pattern else None
-    nlp = matched or formulate_by_factors(problem, cases, elastic, damping_ratio, lead)
+    if problem.pattern:
+        nlp = formulate_matching(problem, cases=cases)
+    else:
+        nlp = formulate_by_factors(problem, cases, elastic, damping_ratio, a0_sign)
     return epigraph_form(nlp, needs_two_sided_bounds(problem))
 
 
@@ -87,15 +89,15 @@ def formulate_by_factors(
     cases: Sequence[Case] = (),
     elastic: bool = False,
     damping_ratio: float | None = None,
-    lead: int = 0,
+    a0_sign: int = 0,
 ) -> NLP:
     """Optimise the objective, with every root quantity expressed by factors in every case."""
-    build = Builder(problem, cases, lead=lead)
+    build = Builder(problem, cases, a0_sign=a0_sign)
     if damping_ratio == 1 or (damping_ratio is None and not elastic and demands_heavy_damping(problem)):
         build.require_real_roots()
     elif damping_ratio is not None:
         build.fix_quantity("damping_ratio", damping_ratio)
-        if len(build.covered_cases) == 1 and rewards_change_of(problem, "damping_ratio", worse=-1.0):
+        if len(build.covered_cases) == 1 and rewards_change_of(problem, "damping_ratio", direction=-1.0):
             build.lifts.append(lift_positive_root(build))
     build.add_constraints()
     build.add_objective()
@@ -106,8 +108,8 @@ def formulate_matching(problem: Posed, pattern: Pattern | None = None, cases: Se
     """Match coefficients with a pattern: a_k = a0 · c_k(unknowns).
 
     If there are as many equations as unknowns, the NLP has no objective. With fewer equations it minimises the
-    objective of the problem. If the problem has no objective, it minimises the distance to the start, each parameter in
-    widths of its range. With more equations it minimises the sum of the squared mismatches.
+    objective of the problem. If the problem has no objective, it minimises the distance to the start, where the unit of
+    each parameter is the width of its range. With more equations it minimises the sum of the squared mismatches.
     """
     pattern = pattern or problem.pattern
     if pattern is None:
@@ -146,7 +148,7 @@ class Builder:
 
     Args:
         lift_functions: root quantity → the function that adds it to the NLP; by default as factors.
-        lead: +1 allows a0 >= 0, −1 allows a0 <= 0, 0 excludes a0 = 0.
+        a0_sign: +1 allows a0 >= 0, −1 allows a0 <= 0, 0 excludes a0 = 0.
     """
 
     def __init__(
@@ -154,9 +156,9 @@ class Builder:
         problem: Posed,
         cases: Sequence[Case],
         lift_functions: Mapping[str, LiftFunction] | None = None,
-        lead: int = 0,
+        a0_sign: int = 0,
     ) -> None:
-        self.problem, self.lead = problem, lead
+        self.problem, self.a0_sign = problem, a0_sign
         self.numbers = numbers_of(problem)
         self.lift_functions = _LIFT_FUNCTIONS if lift_functions is None else lift_functions
         self.cases = tuple(cases)
@@ -165,23 +167,24 @@ class Builder:
         self.bounds: list[tuple[float, float]] = []
         self.rows: list[tuple[str, Any, float, float]] = []
         self.lifts: list[AddedVariable] = []
-        self.contacts: dict[str, tuple[Contact, ...]] = {}  # quantity → ways in which roots can attain its value
+        self.contacts: dict[str, tuple[Contact, ...]] = {}  # root quantity → ways in which roots can attain its value
         self.products: list[tuple[Factor, ...]] = []
         self.quantities: dict[str, Any] = {}
         self.fixed_quantities: set[str] = set()
         self.objective: Any = 0
         self.design = {name: self.add_parameter(name, *ends) for name, ends in problem.free.items()}
         nominal = problem.ordered({**self.design, **{n: symbol(n) for n in problem.fixed if n in self.numbers}})
-        # Cases with a direction limit the robustness radius: their displacements end at their edge, if they have one.
+        # Cases with a direction limit the robustness radius. If such a case has an edge, variables displace the design
+        # to that edge.
         radius_cases = [k for k, case in enumerate(self.cases, start=1) if case.direction]
         radius = self.add_variable(RADIUS, 0.0) if radius_cases else constant(0)
         edges = {k: case.edge for k, case in enumerate(self.cases, start=1) if case.edge}
         displacements = {k: {n: self.add_variable(f"{n}.{k}") for n in self.cases[k - 1].direction} for k in edges}
         parameters = [nominal]
         for k, case in enumerate(self.cases, start=1):
-            displaced = replace(case, direction=displacements.get(k, case.direction))
-            parameters.append(displaced.applied(nominal, radius, problem.weights))
-        self.values = [self.derive_values(k, each) for k, each in enumerate(parameters)]
+            displaced_case = replace(case, direction=displacements.get(k, case.direction))
+            parameters.append(displaced_case.applied(nominal, radius, problem.weights))
+        self.values = [self.derive_values(k, case_parameters) for k, case_parameters in enumerate(parameters)]
         self.scale = scale_of(problem)
         self.a = self.polynomial(0)
         self.covered_cases = [k for k, case in enumerate(self.cases, start=1) if not case.direction] or [0]
@@ -199,6 +202,7 @@ class Builder:
 
     @property
     def size(self) -> tuple[int, int]:
+        """Number of variables and rows so far."""
         return len(self.x), len(self.rows)
 
     def derive_values(self, case: int, parameters: Mapping[str, Any]) -> Values:
@@ -240,18 +244,18 @@ class Builder:
             self.quantities["abscissa"] = lifted.symbol
 
     def fix_quantity(self, name: str, value: float) -> None:
-        """Replace a root quantity by a number. Constraints on this quantity alone are left to the recheck."""
+        """Replace a root quantity by a number. The recheck decides constraints that use only this quantity."""
         self.quantities[name] = constant(value)
         self.fixed_quantities.add(name)
 
-    def add_constraints(self, without: Collection[str] = ()) -> None:
-        """Add a row for each constraint, or a row for each case if the constraint depends on the case."""
+    def add_constraints(self, excluded: Collection[str] = ()) -> None:
+        """Add a row for each constraint that is not excluded, or a row for each case if it depends on the case."""
         for name, condition in self.problem.conditions.items():
-            if name in without:
+            if name in excluded:
                 continue
             if len(condition.names) == 1 and condition.names[0] in self.fixed_quantities:
                 continue
-            limit = symbol(name + LIMIT) if name + LIMIT in self.numbers else None
+            limit = symbol(name + _LIMIT_SUFFIX) if name + _LIMIT_SUFFIX in self.numbers else None
             for value in self.evaluate_cases(condition, limit):
                 self.add_row(name, value, *condition.allowed)
 
@@ -265,27 +269,27 @@ class Builder:
         self.objective = values[0]
         if len(values) > 1:
             self.objective = self.add_variable("objective")
-            worst = partial(worst_guess, sign, expression, tuple(self.covered_cases))
-            self.lifts.append(AddedVariable("objective", 1, worst))
+            guess = partial(guess_worst_value, sign, expression, tuple(self.covered_cases))
+            self.lifts.append(AddedVariable("objective", 1, guess))
             for value in values:
                 self.add_row("objective", value - self.objective, -np.inf, 0.0)
 
     def evaluate_cases(self, expression: Expression, limit: Any = None) -> list[Any]:
         """Values of the expression minus a limit, one for each covered case, or only one if no case changes it."""
         cases = self.covered_cases if depends_on_case(self.problem, expression, self.cases) else [0]
-        each = [self.values[k] for k in cases]
-        return [expression(v) if limit is None else expression.difference(v, limit) for v in each]
+        case_values = [self.values[k] for k in cases]
+        return [expression(v) if limit is None else expression.difference(v, limit) for v in case_values]
 
     def add_pattern(self, pattern: Pattern) -> None:
         unknowns = [self.add_variable(f"{pattern.name}.{u}") for u in pattern.unknowns]
         self.lifts.append(AddedVariable(pattern.name, len(unknowns), lambda v, z: pattern.guesses(z[0])))
         if pattern.abscissa is not None and self.covered_cases == [0]:
             self.quantities["abscissa"] = self.scale.unit * pattern.abscissa(unknowns)
-        matched = [self.a[0] * c for c in pattern.monic(unknowns)]
+        pattern_coefficients = [self.a[0] * c for c in pattern.monic(unknowns)]
         if degrees_of_freedom(self.problem).count >= 0:
-            self.add_equations(pattern.name, self.a, matched)
+            self.add_equations(pattern.name, self.a, pattern_coefficients)
         else:
-            self.objective = sum((a - b) ** 2 for a, b in zip(self.a, matched, strict=True))
+            self.objective = sum((a - b) ** 2 for a, b in zip(self.a, pattern_coefficients, strict=True))
         for expression in pattern.nonnegative(unknowns):
             self.add_row(pattern.name, expression, 0.0, np.inf)
 
@@ -312,7 +316,7 @@ class Builder:
             cases=self.cases,
             contacts=self.contacts,
             products=tuple(self.products),
-            exact=bool(self.products) and formulation == "abscissa",
+            has_exact_starts=bool(self.products) and formulation == "abscissa",
             unit=self.scale.unit,
             size=objective_size(self.problem),
             units=units_of(self.problem),
@@ -323,7 +327,7 @@ class Builder:
         """Ranges of expressions over the box of the variables so far, by interval arithmetic.
 
         Raises:
-            NotAccepted: for an operation that interval arithmetic lacks.
+            NotAccepted: for an operation that interval arithmetic does not have.
         """
         ranges = {variable_name(k): ball(ends) for k, ends in enumerate(self.bounds)}
         numbers = {n: INTERVALS.constant(decimal(x)) for n, x in self.numbers.items()}
@@ -369,5 +373,5 @@ def _numeric_inputs(problem: Posed, values: Values) -> dict[str, float]:
 
 def numbers_of(problem: Posed) -> Mapping[str, float]:
     """Numbers that an NLP takes as parameters: fixed values and limits. A value 0 is written into the formulas."""
-    limits = {name + LIMIT: limit_value(text) for name, text in problem.constraints.items()}
+    limits = {name + _LIMIT_SUFFIX: limit_value(text) for name, text in problem.constraints.items()}
     return Table({name: float(x) for name, x in {**problem.fixed, **limits}.items() if x})

@@ -18,28 +18,30 @@ from tmsopt.program.nlp import NLP, CompiledProgram, PerThread, forget_programs
 from tmsopt.program.options import DEFAULTS, Options
 from tmsopt.records import Array
 
-# With larger steps away from the bounds and shorter ones towards them, the EP4 problem takes a third fewer iterations
+# With larger steps away from the bounds and shorter steps towards them, the EP4 problem takes a third fewer iterations
 # and reaches EP4 from more starts. Scaling and refining the small linear systems would cost a quarter of the time and
 # change no result.
 _NO_SCALING = {"min_refinement_steps": 0, "linear_system_scaling": "none"}
-_FAR = {"bound_push": 0.1, "bound_frac": 0.1, "tau_min": 0.9, **_NO_SCALING}
-_NEAR = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-6, **_NO_SCALING}
-# The barrier of far starts would move away from a start that satisfies the equations of many cases; then only half as
-# many starts of band designs reach the best optimum.
-_EXACT = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-4, **_NO_SCALING}
+_FAR_SETTINGS = {"bound_push": 0.1, "bound_frac": 0.1, "tau_min": 0.9, **_NO_SCALING}
+_NEAR_SETTINGS = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-6, **_NO_SCALING}
+# With the settings for far starts, IPOPT would leave a start that satisfies the equations of many cases. Then only half
+# as many starts of band designs would reach the best optimum.
+_EXACT_SETTINGS = {"bound_push": 1e-9, "bound_frac": 1e-9, "mu_init": 1e-4, **_NO_SCALING}
 _SETTINGS = {
-    name: {f"ipopt.{option}": value for option, value in own.items()}
-    for name, own in {"far": _FAR, "exact": _EXACT, "near": _NEAR}.items()
+    name: {f"ipopt.{option}": value for option, value in settings.items()}
+    for name, settings in {"far": _FAR_SETTINGS, "exact": _EXACT_SETTINGS, "near": _NEAR_SETTINGS}.items()
 }
+"""Kind of a start → options of IPOPT."""
 
 _SIGNALS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP", "SIGALRM") if hasattr(signal, n)]
-_STEPS = 12  # of Newton's method
-_STALLED = 1e-14  # the iteration ends when relative steps below this no longer become smaller
-_STATIONARY = 1e-9  # largest gradient of the Lagrangian that counts as 0
-_DEPENDENT = 1e-9  # limits are dependent if a singular value of their unit gradients is smaller
-_SINGULAR = 1e11  # a matrix is singular if a right side of size 1 has a larger solution
-_ROUNDINGS = 32 * float(np.finfo(float).eps)  # of a row: shifted polynomials of high degree are sums of sums
-_ACTIVE = 1e-5  # slack below which a bound may be active even with a multiplier near 0
+_MAX_NEWTON_STEPS = 12  # greatest number of steps of Newton's method
+_STALLED_STEP = 1e-14  # Newton's method ends when relative steps below this no longer become smaller
+_MAX_STATIONARITY = 1e-9  # largest gradient of the Lagrangian that counts as 0
+_DEPENDENCE_TOLERANCE = 1e-9  # limits are dependent if a singular value of their unit gradients is smaller
+_MAX_SOLUTION = 1e11  # a matrix is singular if a right-hand side of size 1 has a larger solution
+# Relative rounding error of a row; it is large, because shifted polynomials of high degree are sums of sums.
+_ROUNDING = 32 * float(np.finfo(float).eps)
+_ACTIVE_SLACK = 1e-5  # slack below which a bound may be active even with a multiplier near 0
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class Point:
     Attributes:
         violation: largest absolute violation of a row or bound.
         stationarity: largest component of the gradient of the Lagrangian.
-        rounding: violation that rounding of the rows' terms can cause.
+        rounding: violation that rounding errors of the rows can cause.
     """
 
     x: Array
@@ -78,29 +80,28 @@ class Point:
 
 
 def make_ipopt(
-    nlp: NLP, options: Options = DEFAULTS, start: str = "far", max_iterations: int = 150
+    nlp: NLP, options: Options = DEFAULTS, start_kind: str = "far", max_iterations: int = 150
 ) -> Callable[..., Run]:
-    """A solver of one NLP: (start, optionally other limits) → run. Do not share it between threads.
+    """A solver of one NLP: (start, optionally an NLP with other limits) → run. Do not share it between threads.
 
     Args:
-        start: the kind of the starts: ``far`` from a solution, ``near`` a solution, or ``exact``: the equations of all
-            cases hold.
+        start_kind: ``far`` from a solution, ``near`` a solution, or ``exact`` if the equations of all cases hold.
     """
-    unit = (*nlp.units, *[1.0] * (len(nlp.variables) - len(nlp.units)))
+    units = (*nlp.units, *[1.0] * (len(nlp.variables) - len(nlp.units)))
     settings = (("ipopt.linear_solver", options.linear_solver), ("ipopt.max_iter", max_iterations))
-    solver = _SOLVERS.get(nlp.program, unit, 1 / nlp.objective_unit, (*settings, *_SETTINGS[start].items()))
+    solver = _SOLVERS.get(nlp.program, units, 1 / nlp.objective_unit, (*settings, *_SETTINGS[start_kind].items()))
 
     def run(x0: Array, limits: NLP = nlp) -> Run:
         lower, upper = np.array(limits.lower), np.array(limits.upper)
-        first, *ends = ((column / np.array(unit)).tolist() for column in (x0, lower, upper))  # lists are faster
+        start, lbx, ubx = ((column / np.array(units)).tolist() for column in (x0, lower, upper))  # lists are faster
         rows = {"lbg": limits.row_lower, "ubg": limits.row_upper}
-        with interruptible():
-            answer = solver(x0=first, p=limits.constants, lbx=ends[0], ubx=ends[1], **rows)
+        with delay_signals():
+            answer = solver(x0=start, p=limits.constants, lbx=lbx, ubx=ubx, **rows)
         stats = solver.stats()
         return Run(
-            x=np.clip(answer["x"].full().ravel() * np.array(unit), lower, upper),
+            x=np.clip(answer["x"].full().ravel() * np.array(units), lower, upper),
             row_multipliers=answer["lam_g"].full().ravel(),
-            bound_multipliers=answer["lam_x"].full().ravel() / np.array(unit),
+            bound_multipliers=answer["lam_x"].full().ravel() / np.array(units),
             status=str(stats["return_status"]),
         )
 
@@ -108,10 +109,10 @@ def make_ipopt(
 
 
 def _solver(
-    program: CompiledProgram, unit: tuple[float, ...], objective: float, user_settings: tuple[tuple[str, Any], ...]
+    program: CompiledProgram, units: tuple[float, ...], objective_scale: float, settings: tuple[tuple[str, Any], ...]
 ) -> ca.Function:
     """IPOPT on a compiled program, with the variables in the given units."""
-    settings: dict[str, Any] = {
+    all_settings: dict[str, Any] = {
         "print_time": False,
         "show_eval_warnings": False,
         "no_nlp_grad": True,
@@ -120,22 +121,22 @@ def _solver(
         "ipopt.sb": "yes",
         "ipopt.tol": 1e-12,
         "ipopt.bound_relax_factor": 0.0,
-        "ipopt.obj_scaling_factor": objective,
-        **dict(user_settings),
+        "ipopt.obj_scaling_factor": objective_scale,
+        **dict(settings),
     }
-    if set(unit) <= {1.0}:
-        return ca.nlpsol("solver", "ipopt", program.function, {**settings, **program.derivatives})
+    if set(units) <= {1.0}:
+        return ca.nlpsol("solver", "ipopt", program.function, {**all_settings, **program.derivatives})
     x, p, _ = program.symbols
-    in_units = ca.Function("nlp", [x, p], list(program.function(x * ca.DM(unit), p)), ["x", "p"], ["f", "g"])
-    return ca.nlpsol("solver", "ipopt", in_units, settings)
+    in_units = ca.Function("nlp", [x, p], list(program.function(x * ca.DM(units), p)), ["x", "p"], ["f", "g"])
+    return ca.nlpsol("solver", "ipopt", in_units, all_settings)
 
 
 def _conditions(program: CompiledProgram) -> ca.Function:
     """Objective, its gradient, rows, their Jacobian, and the Hessian of the Lagrangian."""
     x, p, rows = program.symbols
-    first = [e for name in ("grad_f", "jac_g") for e in program.derivatives[name](x, p)]
+    first_derivatives = [e for name in ("grad_f", "jac_g") for e in program.derivatives[name](x, p)]
     hessian = ca.triu2symm(program.derivatives["hess_lag"](x, p, 1, rows))
-    return ca.Function("kkt", [x, rows, p], [*first, hessian])
+    return ca.Function("kkt", [x, rows, p], [*first_derivatives, hessian])
 
 
 _SOLVERS, _CONDITIONS = PerThread(_solver, 96), PerThread(_conditions, 32)
@@ -149,7 +150,7 @@ def forget_solvers() -> None:
 
 
 def make_polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
-    """A function (run, limits) → the refined point, or the point of the run itself if that is better."""
+    """A function (run, limits) → the refined point, or the point of the run itself if it is better."""
     expand = _CONDITIONS.get(nlp.program)
 
     def polish(run: Run, limits: NLP) -> Point:
@@ -163,30 +164,28 @@ def make_polisher(nlp: NLP) -> Callable[[Run, NLP], Point]:
 def relaxation_gain(nlp: NLP, point: Point) -> Callable[[Sequence[int]], float]:
     """A function for the first-order gain of the objective if several limits are relaxed at once.
 
-    The gain is the sum of the multipliers of these limits.
-
-    If the active limits are dependent, several multipliers explain the gradient; the gain is then the least sum among
-    them (Gauvin and Dubeau, 1982).
+    The gain is the sum of the multipliers of these limits. If the active limits are dependent, several sets of
+    multipliers explain the gradient; the gain is then the least sum (Gauvin and Dubeau, 1982).
 
     Returns:
         A function of indices of inequalities: rows first, then variables.
     """
     multipliers = np.concatenate([point.row_multipliers, point.bound_multipliers])
-    is_active = np.abs(multipliers) > _STATIONARY * (1 + np.abs(multipliers).max(initial=0.0))
+    is_active = np.abs(multipliers) > _MAX_STATIONARITY * (1 + np.abs(multipliers).max(initial=0.0))
     _, slope, rows, jacobian = (
         part.full() for name in ("grad_f", "jac_g") for part in nlp.program.derivatives[name](point.x, nlp.constants)
     )
     columns = np.hstack([jacobian.T, np.eye(len(point.x))])[:, is_active]
     lengths = np.linalg.norm(columns, axis=0)
     is_usable = np.all(np.isfinite(lengths) & (lengths > 0))
-    dependent = is_usable and np.linalg.matrix_rank(columns / lengths, tol=_DEPENDENT) < len(lengths)
+    are_dependent = is_usable and np.linalg.matrix_rank(columns / lengths, tol=_DEPENDENCE_TOLERANCE) < len(lengths)
     lower, upper = np.array([*nlp.row_lower, *nlp.lower]), np.array([*nlp.row_upper, *nlp.upper])
     value = np.concatenate([rows.ravel(), point.x])
-    signs = np.where(value - lower <= upper - value, -1.0, 1.0)  # of multipliers at a lower and at an upper limit
+    signs = np.where(value - lower <= upper - value, -1.0, 1.0)  # sign of a multiplier at a lower and at an upper limit
     is_equation = (lower == upper)[is_active]
 
     def gain(limits: Sequence[int]) -> float:
-        if dependent:
+        if are_dependent:
             from scipy.optimize import linprog  # importing it takes 0.25 s
 
             cost = np.isin(np.arange(len(multipliers)), limits)[is_active] * signs[is_active]
@@ -203,10 +202,10 @@ def relaxation_gain(nlp: NLP, point: Point) -> Callable[[Sequence[int]], float]:
 
 
 @contextmanager
-def interruptible() -> Iterator[None]:
+def delay_signals() -> Iterator[None]:
     """Delay signal handlers until IPOPT has returned, because CasADi takes their exceptions for failed evaluations.
 
-    In other threads than the main one, which receives the signals, it does nothing.
+    Only the main thread receives signals; in other threads this function does nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -253,56 +252,58 @@ class _Conditions:
     def point(self, x: Array, rows: Array, bounds: Array) -> Point:
         """A point with its violation and stationarity."""
         objective, gradient, g, jacobian, _ = self.evaluate(x, rows)
-        outside = np.concatenate([self.row_lower - g, g - self.row_upper, self.lower - x, x - self.upper, [0.0]])
-        violation = float(outside.max()) if np.all(np.isfinite(g)) else np.inf
+        excesses = np.concatenate([self.row_lower - g, g - self.row_upper, self.lower - x, x - self.upper, [0.0]])
+        violation = float(excesses.max()) if np.all(np.isfinite(g)) else np.inf
         slope = np.abs(gradient + jacobian.T @ rows + bounds).max(initial=0.0)
         terms = float((np.abs(jacobian) @ np.abs(x)).max(initial=0.0))
-        return Point(x, objective, violation, float(slope), rows, bounds, _ROUNDINGS * terms)
+        return Point(x, objective, violation, float(slope), rows, bounds, _ROUNDING * terms)
 
 
 def _polish(conditions: _Conditions, run: Run) -> Point:
     best = conditions.point(run.x, run.row_multipliers, run.bound_multipliers)
-    for loose in (False, True):
-        refined = _newton(conditions, run, loose)
-        if refined is not None and _better(refined, best):
+    for by_slack in (False, True):
+        refined = _newton(conditions, run, by_slack)
+        if refined is not None and _is_better(refined, best):
             best = refined
-        if best is refined and best.stationarity <= _STATIONARY:
+        if best is refined and best.stationarity <= _MAX_STATIONARITY:
             break
-    releasable = _find_releasable(conditions, best)
-    if releasable.any():
-        released = _newton(conditions, run, True, releasable)
-        if released is not None and _better(released, best) and not _find_releasable(conditions, released).any():
-            best = released if released.stationarity <= _STATIONARY else best
+    released_rows = _find_releasable_rows(conditions, best)
+    if released_rows.any():
+        refined = _newton(conditions, run, True, released_rows)
+        if refined is not None and _is_better(refined, best) and not _find_releasable_rows(conditions, refined).any():
+            best = refined if refined.stationarity <= _MAX_STATIONARITY else best
     return best
 
 
-def _find_releasable(conditions: _Conditions, point: Point) -> NDArray[np.bool_]:
+def _find_releasable_rows(conditions: _Conditions, point: Point) -> NDArray[np.bool_]:
     """Rows that are held at a limit with a multiplier of the wrong sign, for example if two limits nearly coincide."""
-    small = _STATIONARY * (1 + np.abs(point.row_multipliers).max(initial=0.0))
-    is_below = np.isinf(conditions.row_upper) & (point.row_multipliers > small)
-    return np.asarray(is_below | (np.isinf(conditions.row_lower) & (point.row_multipliers < -small)))
+    tolerance = _MAX_STATIONARITY * (1 + np.abs(point.row_multipliers).max(initial=0.0))
+    is_below = np.isinf(conditions.row_upper) & (point.row_multipliers > tolerance)
+    return np.asarray(is_below | (np.isinf(conditions.row_lower) & (point.row_multipliers < -tolerance)))
 
 
-def _newton(conditions: _Conditions, run: Run, loose: bool, released: NDArray[np.bool_] | bool = False) -> Point | None:
+def _newton(
+    conditions: _Conditions, run: Run, by_slack: bool, released_rows: NDArray[np.bool_] | bool = False
+) -> Point | None:
     """Newton's method with the active limits as equations, solved by least squares if the limits are dependent.
 
     Args:
-        loose: whether a small slack alone makes a limit active; see `_active`.
-        released: rows that are not held, even if they are active.
+        by_slack: whether a small slack is enough to make a limit active; see `_find_active`.
+        released_rows: rows that are not held, even if they are active.
     """
     lower, upper = conditions.lower, conditions.upper
-    at_lower, at_upper = _active(run.x, lower, upper, run.bound_multipliers, loose)
+    at_lower, at_upper = _find_active(run.x, lower, upper, run.bound_multipliers, by_slack)
     x = np.where(at_lower, lower, np.where(at_upper, upper, run.x))
     is_free = np.logical_not(np.logical_or(at_lower, at_upper))
     g = conditions.evaluate(x, run.row_multipliers)[2]
     if not np.all(np.isfinite(g)):
         return None
-    low, high = _active(g, conditions.row_lower, conditions.row_upper, run.row_multipliers, loose)
-    active_rows = np.logical_or(low, high) & ~np.asarray(released)
-    target = np.where(low, conditions.row_lower, conditions.row_upper)[active_rows]
+    at_low, at_high = _find_active(g, conditions.row_lower, conditions.row_upper, run.row_multipliers, by_slack)
+    active_rows = np.logical_or(at_low, at_high) & ~np.asarray(released_rows)
+    target = np.where(at_low, conditions.row_lower, conditions.row_upper)[active_rows]
     rows = np.where(active_rows, run.row_multipliers, 0.0)
     n, m, last_size = int(is_free.sum()), int(active_rows.sum()), np.inf
-    for _ in range(_STEPS):
+    for _ in range(_MAX_NEWTON_STEPS):
         _, gradient, g, jacobian, hessian = conditions.evaluate(x, rows)
         active = jacobian[np.ix_(active_rows, is_free)]
         matrix = np.block([[hessian[np.ix_(is_free, is_free)], active.T], [active, np.zeros((m, m))]])
@@ -316,7 +317,7 @@ def _newton(conditions: _Conditions, run: Run, loose: bool, released: NDArray[np
         rows = np.zeros_like(rows)
         rows[active_rows] = solution[n:]
         size = np.abs(solution[:n] / (1 + np.abs(x[is_free]))).max(initial=0.0)
-        if size <= _STALLED and size > last_size / 2:  # only rounding remains
+        if size <= _STALLED_STEP and size > last_size / 2:  # only rounding remains
             break
         last_size = size
     if not np.all(np.isfinite(x)):
@@ -336,15 +337,18 @@ def _solve_linear(matrix: Array, right: Array) -> Array:
         solutions = np.linalg.solve(matrix, np.column_stack([right, probes]))
     except np.linalg.LinAlgError:
         solutions = np.full((len(right), 3), np.nan)
-    if np.all(np.isfinite(solutions)) and np.abs(solutions[:, 1:]).max(initial=0.0) <= _SINGULAR:
+    if np.all(np.isfinite(solutions)) and np.abs(solutions[:, 1:]).max(initial=0.0) <= _MAX_SOLUTION:
         return np.asarray(solutions[:, 0])
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-13)[0])
 
 
-def _active(value: Array, lower: Array, upper: Array, multiplier: Array, loose: bool) -> tuple[Array, Array]:
-    """Which lower and upper limits are active: their slack is tiny if `loose`, else smaller than their multiplier."""
-    threshold = _ACTIVE * (1 + np.abs(value))
-    if loose:
+def _find_active(value: Array, lower: Array, upper: Array, multiplier: Array, by_slack: bool) -> tuple[Array, Array]:
+    """Masks of the active lower and of the active upper limits.
+
+    If `by_slack`, a limit is active if its slack is tiny, otherwise if its slack is smaller than its multiplier.
+    """
+    threshold = _ACTIVE_SLACK * (1 + np.abs(value))
+    if by_slack:
         at_lower, at_upper = value - lower <= threshold, upper - value <= threshold
     else:
         at_lower = (value - lower <= -multiplier) & (multiplier < 0)
@@ -355,8 +359,8 @@ def _active(value: Array, lower: Array, upper: Array, multiplier: Array, loose: 
     return at_lower, at_upper & ~at_lower
 
 
-def _better(refined: Point, raw: Point) -> bool:
-    """Whether a refined point is near the raw one, as feasible and not worse, up to rounding."""
+def _is_better(refined: Point, raw: Point) -> bool:
+    """Whether a refined point is near the raw point, and up to rounding as feasible and not worse."""
     scale = 1 + abs(raw.objective)
     return (
         refined.violation <= max(raw.violation, 1e-14 * scale, refined.rounding)

@@ -1,9 +1,9 @@
 """Replaces abs, min and max in an NLP by variables, since a smooth solver cannot handle kinks.
 
-Each of them is written with the greatest of some pieces: |e| is the greatest of e and −e; min(a, b) is minus the
-greatest of −a and −b. The greatest becomes a variable t with a row t ≥ piece for every piece. This is exact if a larger
-t is never an advantage. Otherwise a *contact* is needed: t is held equal to one piece at a time, and the other pieces
-are below it.
+Each of these functions follows from the greatest of several *pieces*: |e| is the greatest of e and −e; min(a, b) is
+minus the greatest of −a and −b. The greatest piece becomes a variable t with a row t ≥ piece for every piece. This is
+exact if a larger t is never an advantage. Otherwise a *contact* is needed: t is held equal to one piece at a time, and
+the other pieces are below t.
 
 A quotient or tangent with a pole in the box becomes a variable t with the equation t · denominator = numerator, which
 is smooth on both sides of the pole.
@@ -29,13 +29,13 @@ KINK = ".kink"
 """Name of the rows of kinks; no constraint has this name."""
 
 
-def epigraph_form(nlp: NLP, two_sided: bool) -> NLP:
+def epigraph_form(nlp: NLP, needs_contacts: bool) -> NLP:
     """The NLP with its kinks as variables, and with the contacts that make it exact.
 
     Args:
-        two_sided: whether root quantities need their contacts even without kinks.
+        needs_contacts: whether root quantities need their contacts even without kinks.
     """
-    smooth_nlp = nlp if two_sided else replace(nlp, contacts={})
+    smooth_nlp = nlp if needs_contacts else replace(nlp, contacts={})
     if not _may_have_kinks(nlp):
         return smooth_nlp
     build = _EpigraphBuilder(nlp)
@@ -43,17 +43,17 @@ def epigraph_form(nlp: NLP, two_sided: bool) -> NLP:
     if not build.kinks:
         return smooth_nlp
     names = (*map(variable_name, range(len(nlp.variables) + len(build.kinks))), *nlp.numbers)
-    count, first = len(build.kinks), len(nlp.rows)
-    rows = sum(len(kink.rows) for kink in build.kinks)
+    count, first_row = len(build.kinks), len(nlp.rows)
+    row_count = sum(len(kink.rows) for kink in build.kinks)
     smooth_nlp = replace(
         nlp,
         variables=(*nlp.variables, *[KINK] * count),
         formula=formula([f, *g], names),
         lower=(*nlp.lower, *[-np.inf] * count),
         upper=(*nlp.upper, *[np.inf] * count),
-        rows=(*nlp.rows, *[KINK] * rows),
-        row_lower=(*nlp.row_lower, *[0.0] * rows),
-        row_upper=(*nlp.row_upper, *(0.0 if kink.quotient else np.inf for kink in build.kinks for _ in kink.rows)),
+        rows=(*nlp.rows, *[KINK] * row_count),
+        row_lower=(*nlp.row_lower, *[0.0] * row_count),
+        row_upper=(*nlp.row_upper, *(0.0 if kink.is_quotient else np.inf for kink in build.kinks for _ in kink.rows)),
         lifts=(*nlp.lifts, *[AddedVariable(KINK, 1, _guess_later)] * count),
         kinks=tuple(build.kinks),
     )
@@ -62,22 +62,22 @@ def epigraph_form(nlp: NLP, two_sided: bool) -> NLP:
     contact_sets: dict[str, tuple[Contact, ...]] = {}
     equation_rows = set[int]()
     for kink in reversed(build.kinks):  # first the kinks that contain others
-        if kink.quotient:
+        if kink.is_quotient:
             equation_rows.update(kink.rows)
         elif not _never_improves(smooth_nlp, slopes(kink.variable), 1.0, equation_rows, kink.rows):
             contact_sets[f"{KINK}{kink.variable}"] = tuple(Contact(row=k) for k in kink.rows)
             equation_rows.update(kink.rows)
-    kink_rows = range(first, first + rows)
+    kink_rows = range(first_row, first_row + row_count)
     for name, contacts in nlp.contacts.items():
         slope_of_row = slopes(nlp.variables.index(name))
         kink_slopes = {k: slope for k, slope in slope_of_row.items() if k in kink_rows}
-        if two_sided or not _never_improves(smooth_nlp, kink_slopes, WORSE_DIRECTION[name], equation_rows):
+        if needs_contacts or not _never_improves(smooth_nlp, kink_slopes, WORSE_DIRECTION[name], equation_rows):
             contact_sets[name] = contacts
     return replace(smooth_nlp, contacts=contact_sets)
 
 
 def _may_have_kinks(nlp: NLP) -> bool:
-    """Whether the box may contain a kink or a pole; one pass of interval arithmetic excludes it for most NLPs."""
+    """Whether the box may contain a kink or a pole; for most NLPs interval arithmetic excludes this in one pass."""
     if not {step.op for step in nlp.formula.steps} & {*_PIECES, *_POLES}:
         return False
     operations = INTERVALS.operations
@@ -88,12 +88,12 @@ def _may_have_kinks(nlp: NLP) -> bool:
             raise UnsupportedOperation
         return operations[op](*operands)
 
-    smooth = {op: f for op, f in operations.items() if op not in _PIECES} | {
+    smooth_operations = {op: f for op, f in operations.items() if op not in _PIECES} | {
         op: partial(divide_off_pole, op) for op in _POLES
     }
     box = [ball(ends) for ends in zip(nlp.lower, nlp.upper, strict=True)]
     try:
-        nlp.fold(box, Kind(smooth, INTERVALS.constant))
+        nlp.fold(box, Kind(smooth_operations, INTERVALS.constant))
     except UnsupportedOperation:
         return True
     return False
@@ -121,14 +121,15 @@ class _EpigraphBuilder:
         variables = set(map(variable_name, range(self.count)))
         if not any(depends_on(e, variables) for e in operands):
             return make_node(op, *operands)
-        t = self.variable(pieces := _PIECES[op](*operands), quotient=False)
+        t = self.add_variable(pieces := _PIECES[op](*operands), is_quotient=False)
         self.rows += [t - piece for piece in pieces]
         return -t if op == "min" else t
 
-    def variable(self, rows: Sequence[Any], quotient: bool) -> Any:
+    def add_variable(self, rows: Sequence[Any], is_quotient: bool) -> Any:
         """A new variable for the rows that the caller then adds."""
-        first = len(self.nlp.rows) + len(self.rows)
-        self.kinks.append(MaximumVariable(self.count, tuple(range(first, first + len(rows))), quotient=quotient))
+        first_row = len(self.nlp.rows) + len(self.rows)
+        rows_of_kink = tuple(range(first_row, first_row + len(rows)))
+        self.kinks.append(MaximumVariable(self.count, rows_of_kink, is_quotient))
         self.count += 1
         return symbol(variable_name(self.count - 1))
 
@@ -148,7 +149,7 @@ class _EpigraphBuilder:
         lower, upper = interval(denominator_range)
         if lower > 0 or upper < 0:
             return quotient_node
-        t = self.variable([None], quotient=True)
+        t = self.add_variable([None], is_quotient=True)
         self.rows.append(t * denominator - numerator)
         return t
 
@@ -157,11 +158,14 @@ _POLES: Mapping[str, Callable[..., tuple[Any, Any]]] = {
     "div": lambda a, b: (a, b),
     "tan": lambda e: (make_node("sin", e), make_node("cos", e)),
 }
+"""Operation → numerator and denominator."""
+
 _PIECES: Mapping[str, Callable[..., Sequence[Any]]] = {
     "abs": lambda e: (e, -e),
     "max": lambda a, b: (a, b),
     "min": lambda a, b: (-a, -b),
 }
+"""Operation → pieces, the greatest of which is the result, or minus the result for min."""
 
 
 def _slopes(jacobian: Any, variable: int) -> dict[int, Any]:
@@ -200,5 +204,5 @@ def _never_improves(
 
 
 def _guess_later(values: Sequence[Values], z: Sequence[Roots]) -> list[list[float]]:
-    """A placeholder; `NLP.set_kinks` computes the start of a kink from the variables before it."""
+    """A placeholder; `NLP.set_kinks` computes the starting value of a kink from the variables that precede it."""
     return [[0.0]]

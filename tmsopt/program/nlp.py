@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import casadi as ca
@@ -22,25 +22,27 @@ from tmsopt.records import Array
 from tmsopt.roots import roots
 from tmsopt.roots.patterns.pattern import Roots
 
-_SHARED = 1e-3  # roots of two factors with a smaller relative distance count as shared
+_SHARED_DISTANCE = 1e-3  # roots of two factors with a smaller relative distance count as shared
 
-_TIE = 1e-3
+_EQUAL_DISTANCE = 1e-3
 """Distances of contacts that differ by less than this count as equal."""
 
-_LARGE = 50_000
+_MAX_EXPRESSION_COST = 50_000
 """Operations times variables above which functions are differentiated instead of expressions."""
 
 _MAX_PROGRAMS = 64
 """Compiled programs in the cache; most are used once, while cases are added one by one."""
 
-_FIRST_DERIVATIVES = {"f": "grad:f:x", "g": "jac:g:x"}  # derivatives, as CasADi writes them
-_SCALE_DESIGNS = 33  # designs from which scales are estimated
-_ORDINARY = (1e-2, 1e3)  # sizes in this range need no scaling
+_FIRST_DERIVATIVES = {"f": "grad:f:x", "g": "jac:g:x"}
+"""Output → its derivative in the notation of CasADi."""
+
+_SCALE_DESIGNS = 33  # number of designs from which scales are estimated
+_ORDINARY_SIZES = (1e-2, 1e3)  # sizes in this range need no scaling
 
 Guess = Callable[[Sequence[Values], Sequence[Roots]], list[list[float]]]
 """Starting values of added variables, from the quantities and roots of the nominal design and of each case.
 
-Each list is one choice."""
+Each list is one choice of these values."""
 
 
 @dataclass(frozen=True)
@@ -48,22 +50,24 @@ class AddedVariable:
     """Variables that the formulation adds to the parameters, and their starting values.
 
     Attributes:
-        close: starting values near a solution, if they differ.
+        guess_near: starting values near a solution, if they differ.
     """
 
     name: str
     size: int
     guess: Guess
-    close: Guess | None = None
+    guess_near: Guess | None = None
 
 
 @dataclass(frozen=True)
 class Contact:
-    """One way in which a root can lie on the edge of the region of a root quantity, or a kink variable equals a piece.
+    """One way in which a root quantity or a kink variable attains its value.
+
+    A root lies on the edge of the region that the quantity bounds, or one piece is equal to the kink variable.
 
     Attributes:
-        distance: distance of the root from the edge at a point of the NLP; by default the value of the row. Of several
-            contacts, the nearest one is tried first.
+        distance: distance of the root from the edge at a point of the NLP; by default the value of the row. The nearest
+            of several contacts is tried first.
         variable, row: index of the variable or of the row that is held at `value`.
     """
 
@@ -78,12 +82,12 @@ class MaximumVariable:
     """A variable t that stands for the greatest of several pieces, and its rows t − piece ≥ 0.
 
     Attributes:
-        quotient: t stands for a quotient instead, with one row t · denominator − numerator = 0.
+        is_quotient: whether t stands for a quotient instead, with one row t · denominator − numerator = 0.
     """
 
     variable: int
     rows: tuple[int, ...]
-    quotient: bool = False
+    is_quotient: bool = False
 
 
 @dataclass(frozen=True)
@@ -91,27 +95,27 @@ class Factor:
     """The variables of a factor t² + βt + κ, or s² + ps + w², or t + δ.
 
     Attributes:
-        first: index of the first variable.
-        squared: whether the second variable is w, not its square.
-        linear: whether there is no second variable.
+        index: index of the first variable.
+        is_squared: whether the second variable is w, not its square.
+        is_linear: whether there is no second variable.
     """
 
-    first: int
-    squared: bool = False
-    linear: bool = False
+    index: int
+    is_squared: bool = False
+    is_linear: bool = False
 
     def real_roots(self, x: Array) -> tuple[float, ...]:
-        """Its real roots in ascending order; none for a complex pair."""
-        if self.linear:
-            return (-float(x[self.first]),)
-        half, q = -x[self.first] / 2, x[self.first + 1]
-        square = half * half - (q * q if self.squared else q)
+        """The real roots of the factor in ascending order; none for a complex pair."""
+        if self.is_linear:
+            return (-float(x[self.index]),)
+        half, q = -x[self.index] / 2, x[self.index + 1]
+        square = half * half - (q * q if self.is_squared else q)
         return (float(half - np.sqrt(square)), float(half + np.sqrt(square))) if square >= 0 else ()
 
 
 @dataclass(frozen=True)
 class NLP:
-    """minimise f(x) subject to lower ≤ x ≤ upper and row_lower ≤ g(x) ≤ row_upper.
+    """Minimise f(x) subject to lower ≤ x ≤ upper and row_lower ≤ g(x) ≤ row_upper.
 
     Attributes:
         formulation: ``abscissa`` or ``matching``.
@@ -121,15 +125,15 @@ class NLP:
         rows: name of each row of g: a constraint, or the equation it belongs to.
         lifts: the variables after the free parameters, in order.
         cases: the variations of the design that its rows cover.
-        contacts: root quantity or kink → the ways in which its bound is attained. It is listed if a bound alone is not
-            enough; then one of its contacts must hold.
-        kinks: a kink comes after those it depends on.
+        contacts: root quantity or kink → the ways to attain it, one of which must hold. A quantity is listed only if
+            its bound is not enough.
+        kinks: the variables that replace kinks; each comes after the kinks that it depends on.
         products: the factors of each polynomial.
-        exact: whether starts satisfy the equations of all cases.
-        unit: of the roots in its variables.
-        size: of the objective, as far as it is known beforehand.
-        units: of the free parameters, for a solver with absolute tolerances.
-        objective_unit: of the objective if it is small, for the same reason.
+        has_exact_starts: whether starts satisfy the equations of all cases.
+        unit: unit of the roots in the variables.
+        size: size of the objective, as far as it is known before the search.
+        units: units of the free parameters, for a solver with absolute tolerances.
+        objective_unit: unit of the objective if it is small, for the same reason.
     """
 
     formulation: str
@@ -146,7 +150,7 @@ class NLP:
     contacts: Mapping[str, tuple[Contact, ...]] = field(repr=False, default_factory=dict)
     kinks: tuple[MaximumVariable, ...] = field(repr=False, default=())
     products: tuple[tuple[Factor, ...], ...] = field(repr=False, default=())
-    exact: bool = False
+    has_exact_starts: bool = False
     unit: float = 1.0
     size: float = 1.0
     units: tuple[float, ...] = ()
@@ -185,14 +189,14 @@ class NLP:
 
     @property
     def constants(self) -> list[float]:
-        """Inputs of the compiled functions besides x: every value that depends on the numbers alone."""
+        """Inputs of the compiled functions in addition to x: every value that depends only on the numbers."""
         values: list[float] = _CONSTANTS.get(self.formula, len(self.variables), tuple(self.numbers.items()))
         return values
 
-    def impose_contacts(self, x: Array, tie: float = _TIE) -> Iterator["NLP"]:
-        """The NLP with one contact held for each entry of `contacts`: first those nearest to a point.
+    def impose_contacts(self, x: Array, tolerance: float = _EQUAL_DISTANCE) -> Iterator["NLP"]:
+        """The NLP with one contact held for each entry of `contacts`, first with the contacts nearest to a point.
 
-        Each NLP after the first exchanges one contact for another one that is as near, up to `tie`.
+        Each further NLP exchanges one of these contacts for another one whose distance is equal up to the tolerance.
         """
         rows = self.evaluate(x)[1] if self.kinks else x
         ranked: list[list[Contact]] = []
@@ -201,7 +205,8 @@ class NLP:
                 float(rows[contact.row]) if contact.distance is None else contact.distance(x) for contact in contacts
             ]
             order = np.argsort(distances, kind="stable")
-            ranked.append([contacts[k] for k in order if distances[k] <= distances[order[0]] + tie or k == order[0]])
+            limit = distances[order[0]] + tolerance
+            ranked.append([contacts[k] for k in order if distances[k] <= limit or k == order[0]])
         nearest = [nearest_contacts[0] for nearest_contacts in ranked]
         yield self._hold_contacts(nearest)
         for k, nearest_contacts in enumerate(ranked):
@@ -223,7 +228,7 @@ class NLP:
         for kink in self.kinks:
             x[kink.variable] = 0.0
             value = -float(self.evaluate(x)[1][list(kink.rows)].min())
-            if kink.quotient:
+            if kink.is_quotient:
                 x[kink.variable] = 1.0
                 denominator = float(self.evaluate(x)[1][kink.rows[0]]) + value
                 value = value / denominator if denominator else 0.0
@@ -233,15 +238,15 @@ class NLP:
     def has_split_double_root(self, x: Array) -> bool:
         """Whether two factors share a real root that is a double root of neither factor.
 
-        The two equal roots cannot become a complex pair, so that the point may be stationary for the NLP but not for
-        the design. If both roots are in one factor, they can.
+        Two equal roots of different factors cannot become a complex pair, so that the point may be stationary for the
+        NLP but not for the design. Two equal roots of one factor can.
         """
         for factors in self.products:
-            real = [real_roots for factor in factors if (real_roots := factor.real_roots(x))]
-            for first, second in combinations(real, 2):
-                tolerance = _SHARED * (1 + max(map(abs, (*first, *second))))
-                is_shared = min(abs(r - t) for r in first for t in second) <= tolerance
-                is_double = any(len(pair) == 2 and pair[1] - pair[0] <= tolerance for pair in (first, second))
+            root_sets = [real_roots for factor in factors if (real_roots := factor.real_roots(x))]
+            for root_pair in combinations(root_sets, 2):
+                tolerance = _SHARED_DISTANCE * (1 + max(abs(root) for roots in root_pair for root in roots))
+                is_shared = min(abs(r - t) for r, t in product(*root_pair)) <= tolerance
+                is_double = any(len(roots) == 2 and roots[1] - roots[0] <= tolerance for roots in root_pair)
                 if is_shared and not is_double:
                     return True
         return False
@@ -257,7 +262,7 @@ class CompiledProgram:
     """The CasADi functions of an NLP, for any numbers.
 
     Attributes:
-        number_formula: inputs of the functions besides the variables, as formulas of the numbers.
+        number_formula: p, the inputs of the functions in addition to the variables x, as formulas of the numbers.
         function: (x, p) → (f, g).
     """
 
@@ -273,11 +278,13 @@ class CompiledProgram:
 
     @cached_property
     def derivatives(self) -> dict[str, ca.Function]:
-        """Derivatives that CasADi would otherwise form anew for every solver."""
+        """The derivatives by name; without them CasADi would form them again for every solver."""
         make = self.function.factory
-        first = {output: make("d" + output, ["x", "p"], [output, d]) for output, d in _FIRST_DERIVATIVES.items()}
-        second = make("dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
-        return {"grad_f": first["f"], "jac_g": first["g"], "hess_lag": second}
+        first_derivatives = {
+            output: make("d" + output, ["x", "p"], [output, d]) for output, d in _FIRST_DERIVATIVES.items()
+        }
+        hessian = make("dd", ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"], {"gamma": ["f", "g"]})
+        return {"grad_f": first_derivatives["f"], "jac_g": first_derivatives["g"], "hess_lag": hessian}
 
 
 def compile_program(formula: Formula, count: int) -> CompiledProgram:
@@ -289,7 +296,7 @@ def compile_program(formula: Formula, count: int) -> CompiledProgram:
     f, *g = fold(variable_formula, inputs_by_name, CASADI)
     outputs = [ca.densify(ca.SX(f)), ca.densify(ca.vertcat(ca.SX(0, 1), *g))]
     function = ca.Function("nlp", [x, p], outputs, ["x", "p"], ["f", "g"])
-    if len(variable_formula.steps) * count >= _LARGE:
+    if len(variable_formula.steps) * count >= _MAX_EXPRESSION_COST:
         inputs: list[Any] = [ca.MX.sym("x", count), ca.MX.sym("p", len(names))]
         function = ca.Function("nlp", inputs, list(function(*inputs)), ["x", "p"], ["f", "g"])
     return CompiledProgram(number_formula, function)
@@ -318,19 +325,14 @@ def forget_programs() -> None:
 
 @dataclass(frozen=True)
 class Scale:
-    """Powers of 2, so that scaling does not round.
-
-    Attributes:
-        unit: of the roots.
-        lead: of the leading coefficient.
-    """
+    """Units of the roots and of the leading coefficient a0: powers of 2, so that scaling does not round."""
 
     unit: float = 1.0
-    lead: float = 1.0
+    a0_unit: float = 1.0
 
     def scale_coefficients(self, coefficients: Sequence[Any]) -> list[Any]:
-        """Descending coefficients of the polynomial in s/unit, over the unit of the leading one."""
-        return [c / (self.lead * self.unit**k) for k, c in enumerate(coefficients)]
+        """Descending coefficients of the polynomial in s/unit, divided by `a0_unit`."""
+        return [c / (self.a0_unit * self.unit**k) for k, c in enumerate(coefficients)]
 
 
 def scale_of(problem: Posed) -> Scale:
@@ -351,16 +353,16 @@ def scale_of(problem: Posed) -> Scale:
 
 def objective_size(problem: Posed) -> float:
     """The size of the objective, at most 1: the unit of the roots if the objective is the abscissa, else 1."""
-    about = problem.objective.names if problem.objective else ()
-    return min(1.0, scale_of(problem).unit) if about == ("abscissa",) else 1.0
+    names = problem.objective.names if problem.objective else ()
+    return min(1.0, scale_of(problem).unit) if names == ("abscissa",) else 1.0
 
 
 def _spread_designs(problem: Posed) -> dict[str, Any]:
-    """Columns of designs spread over the box."""
+    """Free parameter → its values in designs spread over the box."""
     names = list(problem.free)
-    share = (0.5 + np.arange(_SCALE_DESIGNS)[:, None] * golden_steps(len(names))) % 1.0 if names else np.zeros((1, 0))
+    points = (0.5 + np.arange(_SCALE_DESIGNS)[:, None] * golden_steps(len(names))) % 1.0 if names else np.zeros((1, 0))
     lower, upper = (np.array([ends[k] for ends in problem.free.values()]) for k in (0, 1))
-    return dict(zip(names, (lower + (upper - lower) * share).T, strict=True))
+    return dict(zip(names, (lower + (upper - lower) * points).T, strict=True))
 
 
 def objective_unit(problem: Posed) -> float:
@@ -370,7 +372,7 @@ def objective_unit(problem: Posed) -> float:
     [values] = evaluate(problem, [problem.objective], problem.ordered(_spread_designs(problem)))
     size = np.abs(np.atleast_1d(values))
     size = size[np.isfinite(size) & (size > 0)]
-    return _power_of_two(size) if len(size) and np.median(size) < _ORDINARY[0] else 1.0
+    return _power_of_two(size) if len(size) and np.median(size) < _ORDINARY_SIZES[0] else 1.0
 
 
 def units_of(problem: Posed) -> tuple[float, ...]:
@@ -389,7 +391,7 @@ def proof_units(problem: Posed) -> dict[str, float]:
 
 def unit_near(size: float) -> float:
     """A power of 2 near a size; 1 if the size is ordinary, 0 or not finite."""
-    is_ordinary = _ORDINARY[0] <= size <= _ORDINARY[1] or size == 0 or not np.isfinite(size)
+    is_ordinary = _ORDINARY_SIZES[0] <= size <= _ORDINARY_SIZES[1] or size == 0 or not np.isfinite(size)
     return 1.0 if is_ordinary else _power_of_two(np.array([size]))
 
 

@@ -47,7 +47,8 @@ class Options:
         exhaustive: try all starts, even if several agree.
         near: a design that may be close to the optimum, tried first; if both signs of a parameter could be searched,
             only the sign of this design is.
-        alone: if the problem is infeasible, also find how far each limit in conflict would have to be relaxed alone.
+        alone: if the problem is infeasible, also find for each limit in conflict how far it must be relaxed if no other
+            limit is relaxed.
         stability: if no stable design was found, seconds for branch and bound to find one or to prove that none
             exists; 0 skips it. `solve` allows 5 s if SCIP is installed.
         interruptible: whether Ctrl-C ends the search with the best design so far, as in `solve`; otherwise, or without
@@ -78,7 +79,11 @@ Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 
 def documents_options(accepted: type, defaults: Options = DEFAULTS) -> Callable[[Verb], Verb]:
-    """A decorator that adds the accepted options and their defaults to a function's signature."""
+    """A decorator that adds options and their defaults to the signature of a function.
+
+    Args:
+        accepted: the class that lists the options.
+    """
 
     def add_signature(verb: Verb) -> Verb:
         signature = inspect.signature(verb)
@@ -94,22 +99,27 @@ def documents_options(accepted: type, defaults: Options = DEFAULTS) -> Callable[
 
 
 def make_options(
-    chosen: CommonOptions | SolveOptions, accepted: type = CommonOptions, defaults: Options = DEFAULTS, fewest: int = 1
+    options: CommonOptions | SolveOptions,
+    accepted: type = CommonOptions,
+    defaults: Options = DEFAULTS,
+    min_starts: int = 1,
 ) -> Options:
     """The options that a user chose, with defaults for all others.
 
     Args:
-        fewest: smallest meaningful number of starts.
+        accepted: the class that lists the accepted options.
+        min_starts: smallest meaningful number of starts.
 
     Raises:
         TypeError: for an unknown name.
         InputError: for a value out of range.
     """
-    values: dict[str, Any] = {**vars(defaults), **chosen}
-    for name in chosen:
+    values: dict[str, Any] = {**vars(defaults), **options}
+    for name in options:
         if name not in accepted.__annotations__:
             raise TypeError(f"unknown option '{name}'; {suggest(name, accepted.__annotations__)}")
-    faults = [*count_faults("starts", values["starts"], fewest, MOST_STARTS), *count_faults("seed", values["seed"], 0)]
+    faults = [*count_faults("starts", values["starts"], min_starts, MOST_STARTS)]
+    faults += count_faults("seed", values["seed"], 0)
     if not isinstance(values["near"], Mapping | None):
         faults.append(Fault(f"found {short(values['near'])}; accepted: a mapping of parameters to values", ("near",)))
     if not (is_number(values["stability"]) and values["stability"] >= 0):

@@ -6,12 +6,19 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tmsopt.program.ipopt import Run, interruptible
+from tmsopt.program.ipopt import Run, delay_signals
 from tmsopt.program.nlp import NLP, CompiledProgram, PerThread
 from tmsopt.records import Array
 
-_QUIET = ("print_header", "print_iteration", "print_status", "print_time", "show_eval_warnings", "error_on_fail")
-_QUIET_QP = ("print_header", "print_iter", "print_info", "error_on_fail")
+_PRINT_OPTIONS = (
+    "print_header",
+    "print_iteration",
+    "print_status",
+    "print_time",
+    "show_eval_warnings",
+    "error_on_fail",
+)
+_QP_PRINT_OPTIONS = ("print_header", "print_iter", "print_info", "error_on_fail")
 
 
 def make_sqp(nlp: NLP, max_iterations: int = 100) -> Callable[[Array], Run]:
@@ -21,9 +28,9 @@ def make_sqp(nlp: NLP, max_iterations: int = 100) -> Callable[[Array], Run]:
     limits = {"lbx": nlp.lower, "ubx": nlp.upper, "lbg": nlp.row_lower, "ubg": nlp.row_upper, "p": nlp.constants}
 
     def run(x0: Array) -> Run:
-        first = np.clip(x0, lower, upper)
-        with interruptible():
-            answer = solver(x0=first.tolist(), **limits)
+        start = np.clip(x0, lower, upper)
+        with delay_signals():
+            answer = solver(x0=start.tolist(), **limits)
         x, rows, bounds = (np.nan_to_num(answer[name].full().ravel()) for name in ("x", "lam_g", "lam_x"))
         return Run(np.clip(x, lower, upper), rows, bounds, str(solver.stats()["return_status"]))
 
@@ -34,9 +41,9 @@ def _solver(program: CompiledProgram, max_iterations: int) -> ca.Function:
     x, p, _ = program.symbols
     f, g = program.function(x, p)
     settings: dict[str, Any] = {
-        **dict.fromkeys(_QUIET, False),
+        **dict.fromkeys(_PRINT_OPTIONS, False),
         "qpsol": "qrqp",
-        "qpsol_options": dict.fromkeys(_QUIET_QP, False),
+        "qpsol_options": dict.fromkeys(_QP_PRINT_OPTIONS, False),
         "hessian_approximation": "limited-memory",
         "max_iter": max_iterations,
         "tol_pr": 1e-11,

@@ -18,22 +18,23 @@ from tmsopt.roots import is_stable, roots
 from tmsopt.roots.patterns.pattern import Roots
 from tmsopt.roots.patterns.structure import guess_distance
 
-_CANDIDATES = 16
-"""Candidates per start; a start near good designs needs half the iterations."""
+_CANDIDATES_PER_START = 16
+"""Number of candidates for each start; a start near good designs needs half the iterations."""
 
 _RADII = tuple(float(r) for r in np.geomspace(0.5, 1e-3, 28))
+"""Robustness radii that a start may have, the largest first."""
 
 _MAX_CORNER_PARAMETERS = 10  # with at most this many free parameters, all corners of the box are candidates
 
-_BATCH = 16  # starts whose candidates are scored together
+_STARTS_PER_BATCH = 16  # number of starts whose candidates are scored together
 
 
 def choose_starts(problem: Posed, seed: int, count: int) -> Iterator[dict[str, float]]:
     """`count` designs to start from: each is the best of a few candidates of a quasi-random sequence over the box.
 
-    Every other start is chosen by the constraints alone, so that the starts do not all lie in one good region. Every
-    third start comes from candidates that are moved to the faces of the box, because only such starts lead to many
-    optima. The first start is the best corner.
+    Every second start is chosen by the constraints alone, so that the starts do not all lie in one good region. Every
+    third start comes from candidates that are moved to the faces of the box, because many optima are found only from
+    such starts. The first start is the best corner.
     """
     if count > 1 and len(problem.free) <= _MAX_CORNER_PARAMETERS:
         corners = np.array(list(product(*problem.free.values())))
@@ -42,14 +43,14 @@ def choose_starts(problem: Posed, seed: int, count: int) -> Iterator[dict[str, f
         yield dict(zip(problem.free, best.tolist(), strict=True))
         count -= 1
     designs = sample_box(problem, seed)
-    for first in range(0, count, _BATCH):
-        size = min(_BATCH, count - first)
-        pool = list(islice(designs, _CANDIDATES * size))
-        pool = [_move_to_faces(problem, d) if k // _CANDIDATES % 3 == 2 else d for k, d in enumerate(pool)]
+    for first_index in range(0, count, _STARTS_PER_BATCH):
+        size = min(_STARTS_PER_BATCH, count - first_index)
+        pool = list(islice(designs, _CANDIDATES_PER_START * size))
+        pool = [_move_to_faces(problem, d) if k // _CANDIDATES_PER_START % 3 == 2 else d for k, d in enumerate(pool)]
         columns = {n: np.array([d[n] for d in pool]) for n in problem.free}
-        objective, violation = (m.reshape(size, _CANDIDATES) for m in _measure_merit(problem, columns))
+        objective, violation = (m.reshape(size, _CANDIDATES_PER_START) for m in _measure_merit(problem, columns))
         merit = violation + objective * (np.arange(size) % 2 == 0)[:, None]
-        yield from (pool[row * _CANDIDATES + int(np.argmin(merit[row]))] for row in range(size))
+        yield from (pool[row * _CANDIDATES_PER_START + int(np.argmin(merit[row]))] for row in range(size))
 
 
 def _find_stable_radius(nlp: NLP, problem: Posed, nominal: Mapping[str, float]) -> float:
@@ -67,19 +68,19 @@ def _find_stable_radius(nlp: NLP, problem: Posed, nominal: Mapping[str, float]) 
 
 
 def _move_to_faces(problem: Posed, design: Mapping[str, float]) -> dict[str, float]:
-    """The design with each parameter in an outer third of its range moved to the end of that range."""
+    """The design, in which each parameter in an outer third of its range is moved to the end of the range."""
     values = {}
     for name, (lower, upper) in problem.free.items():
-        share = (design[name] - lower) / (upper - lower)
-        values[name] = lower if share < 1 / 3 else upper if share > 2 / 3 else design[name]
+        position = (design[name] - lower) / (upper - lower)
+        values[name] = lower if position < 1 / 3 else upper if position > 2 / 3 else design[name]
     return values
 
 
-def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], near: bool = False) -> Array:
+def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], is_near: bool = False) -> Array:
     """The starting point of an NLP: the design, and values of the added variables that satisfy their equations.
 
     Args:
-        near: whether the design is close to a solution.
+        is_near: whether the design is near a solution.
     """
     nominal = problem.ordered(design)
     radius = _find_stable_radius(nlp, problem, nominal)
@@ -88,7 +89,7 @@ def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], near: b
     z = _compute_roots(nlp, values)
     x = variables_of(problem, design)
     for lift in nlp.lifts:
-        guess = lift.close if near and lift.close else lift.guess
+        guess = lift.guess_near if is_near and lift.guess_near else lift.guess
         guesses = guess(values, z) or [[0.0] * lift.size]
         mismatches = [_measure_mismatch(nlp, x, guess) for guess in guesses] if len(guesses) > 1 else [0.0]
         x = x + guesses[int(np.argmin(mismatches))]
@@ -104,7 +105,7 @@ def complete_starts(nlp: NLP, problem: Posed, design: Mapping[str, float]) -> It
 
 
 def _compute_roots(nlp: NLP, values: Sequence[Values]) -> list[Roots]:
-    """Roots in each case, in the NLP's unit."""
+    """Roots in each case, in the unit of the NLP."""
     return list(roots(regularise(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
 
 
@@ -127,11 +128,11 @@ def _measure_merit(problem: Posed, columns: Mapping[str, Array]) -> tuple[Array,
     scores = score_designs(problem, columns)
     shape = next(iter(columns.values())).shape
     objective, violation = np.zeros(shape), np.zeros(shape)
-    if scores.worth is not None:
-        objective += _divide_by_spread(scores.worth)
+    if scores.objective is not None:
+        objective += _divide_by_spread(scores.objective)
     if problem.pattern is not None:
-        each = coefficients_of(problem, problem.ordered(columns))
-        a = regularise(np.stack([np.broadcast_to(c, shape) for c in each], axis=-1))
+        coefficients = coefficients_of(problem, problem.ordered(columns))
+        a = regularise(np.stack([np.broadcast_to(c, shape) for c in coefficients], axis=-1))
         mismatch = [guess_distance(problem.pattern, c, z) for c, z in zip(a, roots(a), strict=True)]
         violation += 3 * _divide_by_spread(np.array(mismatch))
     for excess in scores.excess:
@@ -141,13 +142,13 @@ def _measure_merit(problem: Posed, columns: Mapping[str, Array]) -> tuple[Array,
 
 def _divide_by_spread(column: Array) -> Array:
     """A column in units of its interquartile range; a value that is not finite becomes huge."""
-    finite = column[np.isfinite(column)]
-    spread = float(np.subtract(*np.percentile(finite, [75, 25]))) if finite.size else 0.0
+    finite_values = column[np.isfinite(column)]
+    spread = float(np.subtract(*np.percentile(finite_values, [75, 25]))) if finite_values.size else 0.0
     return np.where(np.isfinite(column), column, 1e6) / (spread or 1.0)
 
 
 def _measure_mismatch(nlp: NLP, x: list[float], guess: list[float]) -> float:
-    """Size of the rows while the variables that are added later are still 0."""
+    """Sum of |g| over the rows, with 0 for the variables that have no starting values yet."""
     trial = np.zeros(len(nlp.variables))
     trial[: len(x) + len(guess)] = x + guess
     g = nlp.evaluate(trial)[1]

@@ -14,7 +14,7 @@ from tmsopt.global_search.race import SolverPool
 from tmsopt.global_search.stability import SOLVER
 from tmsopt.global_search.tasks import INFEASIBLE, SolverFailed
 from tmsopt.problem.cases import Case
-from tmsopt.problem.files import Given, as_solvable
+from tmsopt.problem.files import ProblemSource, as_solvable
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES
 from tmsopt.problem.solution import Bound, Solution
 from tmsopt.program.formulate import Builder
@@ -35,7 +35,7 @@ _MIN_RATIO = 1.5  # if smallest gap proved / largest gap not proved is less, no 
 _TIME_SHARE = 0.6  # share of the time left that a gap gets, unless it is the last gap to try
 
 
-def certify(design: Given, *, seconds: float = SECONDS, progress: Listener | None = None) -> Solution:
+def certify(design: ProblemSource, *, seconds: float = SECONDS, progress: Listener | None = None) -> Solution:
     """Prove a bound on the objective of every design in the box; return the design with this bound.
 
     SCIP decides whether any design is better than this one by more than a gap. If none is, the gap gives the bound. If

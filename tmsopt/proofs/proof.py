@@ -15,7 +15,7 @@ from tmsopt.models.exact import ExactDesign, as_exact_design
 from tmsopt.models.names import number_text
 from tmsopt.models.user_spectrum import pattern_of, user_roots, user_structure_name
 from tmsopt.problem.cases import Case
-from tmsopt.problem.files import Given
+from tmsopt.problem.files import ProblemSource
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import units_of
@@ -145,7 +145,11 @@ class Proof(Printable):
 
 @documents_options(SolveOptions)
 def prove(
-    design: Given, digits: int = DIGITS, *, exact: Mapping[str, Any] | None = None, **options: Unpack[SolveOptions]
+    design: ProblemSource,
+    digits: int = DIGITS,
+    *,
+    exact: Mapping[str, Any] | None = None,
+    **options: Unpack[SolveOptions],
 ) -> Proof:
     """Prove in ball arithmetic that the design a problem asks for exists, and decide its stability.
 

@@ -101,5 +101,9 @@ def is_better(problem: Posed, candidate: CheckedEnd, other: CheckedEnd) -> bool:
 
 def _has_unreached_root(trial: CheckedEnd) -> bool:
     """Whether a trial that has not converged has the objective of a multiple root that it only comes close to."""
-    ideal, stored, tolerance = trial.checked.structure.abscissa, trial.checked.realised, trial.tuning.claim_tolerance
+    ideal, stored, tolerance = (
+        trial.checked.structure.abscissa,
+        trial.checked.abscissa_realised,
+        trial.tuning.claim_tolerance,
+    )
     return not has_converged(trial) and not math.isclose(ideal, stored, rel_tol=tolerance, abs_tol=tolerance)

@@ -12,8 +12,8 @@ from tmsopt.errors import input_error, is_number, short
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.global_search import Completeness, prove_completeness
 from tmsopt.global_search.completeness import SECONDS
-from tmsopt.problem import Given, Posed, Solution, degrees_of_freedom, pose
-from tmsopt.problem.validate import SMALLEST
+from tmsopt.problem import Posed, ProblemSource, Solution, degrees_of_freedom, pose
+from tmsopt.problem.validate import MIN_SIZE
 from tmsopt.program import NLP, CommonOptions, Options, formulate_matching, make_options
 from tmsopt.program.formulate import design_of
 from tmsopt.program.options import documents_options
@@ -116,7 +116,7 @@ class Every(Tabular):
 
 
 @documents_options(CommonOptions, _DEFAULTS)
-def solve_all(problem: Given, *, seconds: float = SECONDS, **options: Unpack[CommonOptions]) -> Every:
+def solve_all(problem: ProblemSource, *, seconds: float = SECONDS, **options: Unpack[CommonOptions]) -> Every:
     """Find every design in the box with the located pattern, if the pattern leaves no freedom.
 
     Interval branch and prune proves which designs exist and that there is no other. If it takes too long, Newton's
@@ -213,7 +213,7 @@ def _search_starts(state: SearchState) -> tuple[list[_IsolatedDesign], Coverage]
             if not end.is_isolated:
                 found_singular, found_crossing = (
                     found_singular or not checked.violations,
-                    found_crossing or checked.crossing,
+                    found_crossing or checked.is_crossing,
                 )
             elif not checked.violations:
                 # An angle's error is at most its tangent's; the other variables are the factors' coefficients.
@@ -263,7 +263,7 @@ def _build_equations(problem: Posed) -> NLP:
 
 def _drop_tiny(design: Mapping[str, float]) -> dict[str, float]:
     """Replace numbers that are too small for a problem by 0."""
-    return {n: x if abs(x) >= SMALLEST else 0.0 for n, x in design.items()}
+    return {n: x if abs(x) >= MIN_SIZE else 0.0 for n, x in design.items()}
 
 
 def _take_design(problem: Posed, nlp: NLP, x: Array) -> dict[str, float] | None:

@@ -17,7 +17,7 @@ from tmsopt.search.stopping import is_proven
 
 def solve_from(state: SearchState, start: Start) -> LocalEnd:
     """Solve from one start. While IPOPT does not converge and restarts help, restart at its end with new factors."""
-    tuning, is_exact = state.tuning, state.nlp.cases and state.nlp.exact
+    tuning, is_exact = state.tuning, state.nlp.cases and state.nlp.has_exact_starts
     best = run_once(state, start, "near" if start.near else "exact" if is_exact else "far")
     for restart in range(tuning.restarts):
         has_converged = (
@@ -56,7 +56,7 @@ def keep_to_start(state: SearchState, start: Start, best: LocalEnd) -> LocalEnd:
     if state.sample is None or not best.feasible:
         return best
     box = state.sample.box
-    start_batch = box.judge_points(box.space.points(start.design)[None])
+    start_batch = box.judge_points(box.space.point(start.design)[None])
     if start_batch.violation[0] > 0 or start_batch.objective[0] >= best.objective - state.tuning.same_objective:
         return best
     second_end = run_once(state, start, "far" if start.near else "near")
@@ -122,8 +122,8 @@ def _add_led_designs(state: SearchState, end: LocalEnd) -> LocalEnd:
     if not (state.sample and end.feasible and state.part.objective) or state.options.exhaustive:
         return end
     tuning, leaders, box = state.tuning, state.sample.leaders, state.sample.box
-    end_point = box.space.points(state.design_at(end))
-    known_points = (box.space.points(state.design_at(other)) for other in state.feasible)
+    end_point = box.space.point(state.design_at(end))
+    known_points = (box.space.point(state.design_at(other)) for other in state.feasible)
     if is_proven(state, end) or any(np.abs(end_point - other).max() <= tuning.same_objective for other in known_points):
         return end  # the search ends here, or an earlier end has the same design
     rows = [row for row in state.left if row != end.start.row]

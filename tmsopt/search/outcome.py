@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.evaluation import find_worst_cases
 from tmsopt.evaluation.bound import instant_bound, minimizes_abscissa
 from tmsopt.evaluation.recheck import Evaluation, recheck
-from tmsopt.evaluation.worst_case import Worst
+from tmsopt.evaluation.worst_case import WorstCase
 from tmsopt.problem import Case, Posed, Relaxation, Starts, degrees_of_freedom
 from tmsopt.problem.solution import OtherBranch
 from tmsopt.program import NLP, choose_starts, formulate_by_factors, formulate_matching, initial_point
@@ -173,7 +173,7 @@ def is_unclear(problem: Posed, checked: Evaluation) -> bool:
     uses damping ratios and several roots are 0 up to rounding, because a root 0 has no damping ratio.
     """
     roots = checked.structure.roots
-    if not roots or not math.isfinite(checked.realised):
+    if not roots or not math.isfinite(checked.abscissa_realised):
         return False
     sizes = sorted(r.size for r in roots)
     has_damping_limits = any("damping_ratio" in e.names for e in (problem.objective, *problem.conditions.values()) if e)
@@ -181,7 +181,7 @@ def is_unclear(problem: Posed, checked: Evaluation) -> bool:
         return True
     errors = (r.size * _COEFFICIENT_ERROR ** (1 / r.multiplicity) for r in roots)
     scatter = max(errors) + _ZERO_ROOT * sizes[-1]
-    return bool(abs(checked.structure.abscissa - checked.realised) > scatter)
+    return bool(abs(checked.structure.abscissa - checked.abscissa_realised) > scatter)
 
 
 def _find_active_limits(problem: Posed, nlp: NLP, point: Point) -> dict[str, float]:
@@ -267,16 +267,16 @@ def demote_if_beaten(state: SearchState, outcome: Outcome) -> Outcome:
         return outcome
     box, objective = state.sample.box, problem.sign * outcome.checked.objective
     threshold = objective - tuning.better_by * (state.nlp.size + abs(objective))
-    points = np.array([box.space.points(design) for design in state.designs]).reshape(-1, box.space.size)
+    points = np.array([box.space.point(design) for design in state.designs]).reshape(-1, box.space.size)
     is_distinct = (
-        np.abs(points - box.space.points(outcome.parameters)).max(axis=1, initial=0.0) > tuning.same_design_distance
+        np.abs(points - box.space.point(outcome.parameters)).max(axis=1, initial=0.0) > tuning.same_design_distance
     )
     rivals = box.judge_points(points[is_distinct]).select_better(threshold).take_best(tuning.rival_starts)
     for design in box.designs(rivals):
         rival = assess_design(problem, design, BETTER_END)
         checked = rival.checked
         # Counting several roots as one multiple root may improve the objective by this difference.
-        merging_gain = abs(checked.structure.abscissa - checked.realised)
+        merging_gain = abs(checked.structure.abscissa - checked.abscissa_realised)
         is_sound = not checked.violations and not is_unclear(problem, checked)
         if is_sound and problem.sign * checked.objective < threshold - merging_gain:
             return replace(rival, starts=outcome.starts, formulation=outcome.formulation)
@@ -307,6 +307,6 @@ def _is_a0_limited(problem: Posed, outcome: Outcome) -> bool:
     return not a0_parameters or bool(limited_names & a0_parameters or limited_names - set(problem.free))
 
 
-def merge_cases(problem: Posed, worst_cases: Mapping[str, Worst]) -> tuple[Case, ...]:
+def merge_cases(problem: Posed, worst_cases: Mapping[str, WorstCase]) -> tuple[Case, ...]:
     """Return the listed cases and the worst cases."""
     return (*problem.cases, *(w.case for w in worst_cases.values())) if problem.cases else ()

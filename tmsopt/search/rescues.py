@@ -172,7 +172,7 @@ def _propose_near_designs(
     """Move a design slightly towards others; yield designs that meet the limits and have nearly this objective."""
     assert state.sample is not None
     box, tuning = state.sample.box, state.tuning
-    point = box.space.points(design)
+    point = box.space.point(design)
     random = stream(box.seed, "aside").random((tuning.aside_targets, len(point)))
     targets = np.concatenate([state.sample.refined.u[: tuning.rival_starts], random])
     points = point + np.array(tuning.aside_steps)[:, None, None] * (targets - point)
@@ -251,7 +251,7 @@ def search_singular(state: SearchState, policy: Policy) -> SearchState:
     threshold = compute_threshold(state, -tuning.better_by if is_at_zero else tuning.polished_difference)
     for sign in (1, -1):
         side_starts = [s for s in starts if sign * compute_relative_a0(state, s.design) > -tuning.zero_a0]
-        nlp = formulate(state.part, state.nlp.cases, lead=sign)
+        nlp = formulate(state.part, state.nlp.cases, a0_sign=sign)
         side_state = try_starts(state.with_program(nlp), side_starts, disable_stopping(policy))
         best_end = min(side_state.feasible, key=lambda end: end.objective, default=None)
         if best_end is None or not best_end.objective < threshold:
@@ -291,7 +291,7 @@ def compute_relative_a0(state: SearchState, design: Mapping[str, float]) -> floa
 
 def has_merged_roots(trial: CheckedEnd) -> bool:
     """Whether distant roots count as one, because rounding errors near a0 = 0 dominate the coefficients."""
-    ideal, stored = trial.checked.structure.abscissa, trial.checked.realised
+    ideal, stored = trial.checked.structure.abscissa, trial.checked.abscissa_realised
     return abs(ideal - stored) > trial.tuning.distinct_root_difference * abs(ideal)
 
 

@@ -178,7 +178,7 @@ class Box:
     def explore(self, design: Mapping[str, float]) -> DesignBatch:
         """Find the best designs around a design: at many distances, and with one parameter at an end of its range."""
         tuning, size = self.tuning, self.space.size
-        u, rng = self.space.points(design), stream(self.seed, "around")
+        u, rng = self.space.point(design), stream(self.seed, "around")
         distances = np.repeat(np.geomspace(0.5, 1e-5, tuning.shell_distances), tuning.shell_designs)[:, None]
         steps = rng.standard_normal((len(distances), size))
         steps[::2] *= rng.random(steps[::2].shape) < 0.5
@@ -211,8 +211,8 @@ class Box:
         steps = np.where(u < 0.5, self.tuning.difference_step, -self.tuning.difference_step)
         points = u[:, None] + np.concatenate([np.zeros((1, size)), np.eye(size)])[None] * steps[:, None]
         scores = score_designs(self.problem, self.space.designs(points.reshape(-1, size)))
-        excess = scores.beyond.reshape(len(scores.beyond), len(u), size + 1) / self.scales[:, None, None]
-        is_violated = scores.equal[:, None] | (excess[:, :, 0] > 0)
+        excess = scores.signed_excess.reshape(len(scores.signed_excess), len(u), size + 1) / self.scales[:, None, None]
+        is_violated = scores.is_equality[:, None] | (excess[:, :, 0] > 0)
         target = np.where(is_violated, excess[:, :, 0], 0.0)
         with np.errstate(over="ignore", invalid="ignore"):  # some limits have no value
             slopes = np.where(is_violated[:, :, None], (excess[:, :, 1:] - excess[:, :, :1]) / steps, 0.0)
@@ -270,7 +270,7 @@ def draw_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Box:
     space = UnitBox(problem)
     u = _draw_points(space, seed, tuning)
     scores = score_designs(problem, space.designs(u))
-    sizes = [np.abs(excess[np.isfinite(excess)]) for excess in scores.beyond]
+    sizes = [np.abs(excess[np.isfinite(excess)]) for excess in scores.signed_excess]
     medians = np.array([float(np.median(x)) if x.size else 0.0 for x in sizes])
     scales = np.where(medians > 0, medians, 1.0)
     return Box(space, seed, scales, _make_batch(u, scores, scales, tuning), scores, tuning)
@@ -321,7 +321,7 @@ def _draw_points(space: UnitBox, seed: int, tuning: Tuning) -> Array:
 
 
 def _make_batch(u: Array, scores: DesignScores, scales: Array, tuning: Tuning) -> DesignBatch:
-    objective = np.zeros(len(u)) if scores.worth is None else scores.worth
+    objective = np.zeros(len(u)) if scores.objective is None else scores.objective
     excess = scores.excess / scales[:, None]
     violation = np.where(excess <= tuning.limit_tolerance, 0.0, excess).sum(axis=0)
     return DesignBatch(u, np.where(np.isfinite(objective), objective, np.inf), violation)
@@ -330,7 +330,7 @@ def _make_batch(u: Array, scores: DesignScores, scales: Array, tuning: Tuning) -
 def _add_basins(box: Box, leaders: DesignBatch) -> DesignBatch:
     """Refine the leaders and the best design of each basin that the sample shows; return the best few of both."""
     tuning = box.tuning
-    rows, cell_sizes = find_basins(box.draws, *box.space.even_near_zero(box.draws.u), tuning)
+    rows, cell_sizes = find_basins(box.draws, *box.space.resolve_near_zero(box.draws.u), tuning)
     count, start = len(leaders), leaders.join(box.draws.take(rows[: tuning.basins]))
     step_sizes: list[float | Array] = [
         np.concatenate([np.full((count, 1, box.space.size), of_box), of_cell * cell_sizes[: tuning.basins, None]])

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from tmsopt.evaluation import find_worst_cases
-from tmsopt.evaluation.recheck import FEASIBLE
-from tmsopt.evaluation.worst_case import Worst
+from tmsopt.evaluation.recheck import FEASIBILITY_TOLERANCE
+from tmsopt.evaluation.worst_case import WorstCase
 from tmsopt.problem import Case, Posed, Starts
 from tmsopt.problem.dependence import WORSE_DIRECTION
 from tmsopt.problem.quantities import RADIUS
@@ -81,12 +81,12 @@ def add_worst_cases(state: SearchState, policy: Policy, starts: Starts) -> Outco
             replace(state.with_program(state.nlp), extra=designs), replace(RADIUS_POLICY, tuning=tuning)
         )
         state = climb_state if climb_state.best else state
-    best, worst_cases = state.best, dict[str, Worst]()
+    best, worst_cases = state.best, dict[str, WorstCase]()
     for _ in range(tuning.radius_rounds if problem.asks_radius else tuning.case_rounds):
         trial = state.best
         if trial is None or best is None:
             return None
-        if sum(trial.checked.violations.values()) > math.sqrt(FEASIBLE) and not problem.asks_radius:
+        if sum(trial.checked.violations.values()) > math.sqrt(FEASIBILITY_TOLERANCE) and not problem.asks_radius:
             break  # the design violates limits in the present cases
         worst_cases = find_worst_cases(problem, trial.parameters)
         new_cases = _find_worse_cases(problem, trial, worst_cases)
@@ -122,7 +122,7 @@ def _is_worse_than_leaders(state: SearchState, leaders: Sequence[Mapping[str, fl
     return value > best_known and not same_objective(value, best_known, state.nlp.size, state.tuning.same_objective)
 
 
-def _find_worse_cases(problem: Posed, trial: CheckedEnd, worst_cases: Mapping[str, Worst]) -> list[Case]:
+def _find_worse_cases(problem: Posed, trial: CheckedEnd, worst_cases: Mapping[str, WorstCase]) -> list[Case]:
     """Find cases in which a design is worse than in all cases of its program."""
     cases, checked = list[Case](), trial.checked
     values = {**checked.quantities, "abscissa": checked.structure.abscissa}
@@ -134,7 +134,7 @@ def _find_worse_cases(problem: Posed, trial: CheckedEnd, worst_cases: Mapping[st
         else:
             amount = problem.conditions[name.removeprefix("constraint ")].excess(worst.value)
             excess = float(amount) if amount > 0 else 0.0  # nan counts as none
-        if not excess <= FEASIBLE * (1 + abs(worst.value)) and worst.case not in cases:
+        if not excess <= FEASIBILITY_TOLERANCE * (1 + abs(worst.value)) and worst.case not in cases:
             cases.append(worst.case)
     return cases
 

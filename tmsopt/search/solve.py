@@ -15,10 +15,20 @@ from tmsopt.evaluation.exclusion import bound_without_search
 from tmsopt.evaluation.recheck import Evaluation
 from tmsopt.evaluation.stored import find_storable_design
 from tmsopt.models.user_spectrum import beyond_axis, polynomial_structure, remove_rounding, user_structure_name
-from tmsopt.problem import Bound, Given, NotSolved, Posed, Solution, as_solvable, degrees_of_freedom, unit_at, unit_of
+from tmsopt.problem import (
+    Bound,
+    NotSolved,
+    Posed,
+    ProblemSource,
+    Solution,
+    as_solvable,
+    degrees_of_freedom,
+    unit_at,
+    unit_of,
+)
 from tmsopt.problem.dependence import sense_notes
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
-from tmsopt.problem.verdict.meetings import every_meeting
+from tmsopt.problem.verdict.meetings import all_meetings
 from tmsopt.problem.verdict.stability import stability
 from tmsopt.program import DEFAULTS, Options, SolveOptions, make_options, objective_size
 from tmsopt.program.options import documents_options
@@ -45,7 +55,9 @@ _STARTS_NEAR = 4  # starts at and near a design that branch and bound found
 
 
 @documents_options(SolveOptions, _SOLVE_DEFAULTS)
-def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **options: Unpack[SolveOptions]) -> Solution:
+def solve(
+    problem: ProblemSource, *, throw: bool = True, policy: Policy = POLICY, **options: Unpack[SolveOptions]
+) -> Solution:
     """Find the best design, from several starts, and check it independently of the solver.
 
     Ctrl-C stops the search. The result is then the best design so far, with the status ``not_converged`` and
@@ -80,7 +92,7 @@ def solve(problem: Given, *, throw: bool = True, policy: Policy = POLICY, **opti
 
 
 def solve_any_status(
-    problem: Given,
+    problem: ProblemSource,
     options: Options = DEFAULTS,
     extra_starts: Sequence[Mapping[str, float]] = (),
     without_sample: bool = False,
@@ -181,7 +193,7 @@ def add_worst_case_proof(solution: Solution) -> Solution:
     return replace(solution, cover=prove_worst_case(problem, solution.parameters, solution.abscissa))
 
 
-def solve_if_needed(problem: Given, progress: Listener | None) -> Solution:
+def solve_if_needed(problem: ProblemSource, progress: Listener | None) -> Solution:
     """Solve a problem or a file with default options, as `solve_any_status`. Return a `Solution` unchanged."""
     return solve_any_status(problem, replace(DEFAULTS, progress=steps_for(progress)))
 
@@ -305,7 +317,9 @@ def _assemble(
     name = user_structure_name(problem.model, checked.structure.name)
     worst_parameters = checked.worst.applied(parameters)
     all_roots = polynomial_structure(problem.model, name, numbers.roots).roots
-    multiple_roots = every_meeting(problem, worst_parameters, all_roots, () if checked.crossing else checked.violations)
+    multiple_roots = all_meetings(
+        problem, worst_parameters, all_roots, () if checked.is_crossing else checked.violations
+    )
     edges, is_certain = find_edges(
         problem, worst_parameters, checked.structure, is_optimal, numbers.abscissa, multiple_roots
     )
@@ -315,7 +329,7 @@ def _assemble(
         value=numbers.value,
         parameters=Table(outcome.parameters),
         abscissa=numbers.abscissa,
-        abscissa_realised=numbers.realised,
+        abscissa_realised=numbers.abscissa_realised,
         roots=remove_rounding(problem.model, numbers.roots),
         structure=name,
         active=Table(outcome.active_gains),
@@ -369,7 +383,7 @@ def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str
     if unstable_note or not is_optimal or checked.structure.abscissa < 0:
         return unstable_note
     largest = max((r.size for r in checked.structure.roots), default=0.0)
-    verdict = stability((checked.structure.abscissa, checked.realised), edges, largest=largest)
+    verdict = stability((checked.structure.abscissa, checked.abscissa_realised), edges, largest=largest)
     if problem.free and minimizes_abscissa(problem):
         edge_note = (
             "no design that decays was found in the box; at abscissa 0, multiple roots decide whether motions grow"

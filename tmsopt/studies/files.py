@@ -295,7 +295,7 @@ class _StudyFile(Section):
     """Tolerances of a Monte Carlo study, in place of those of the problem."""
 
 
-SHAPE: type[Section] = _StudyFile
+FILE_SCHEMA: type[Section] = _StudyFile
 """The model of a study file, for the JSON Schema that editors use."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tmsopt.errors import Fault, InputError, count_faults, is_number, limit_advice, short, suggest, text_faults
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.freedom import find_objective_faults
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
@@ -96,7 +96,7 @@ def prepare_study(request: Study | Sampling, progress: Listener | None = None, s
 
 
 def monte_carlo(
-    design: Given,
+    design: ProblemSource,
     rows: int,
     seed: int = 0,
     distribution: str = "uniform",

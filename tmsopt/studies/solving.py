@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from tmsopt.errors import InputError
-from tmsopt.evaluation.columns import BLOCK, can_evaluate_columns, evaluate_columns
+from tmsopt.evaluation.columns import DESIGNS_PER_BLOCK, can_evaluate_columns, evaluate_columns
 from tmsopt.evaluation.law_rows import law_rows
 from tmsopt.models import tms
 from tmsopt.problem.solution import Solution
@@ -199,8 +199,8 @@ def evaluate_rows(study: Study, numbers: NDArray[np.int64]) -> Iterator[Batch]:
         numbers: numbers of the rows, ascending.
     """
     varied = {name: np.asarray(column) for name, column in study.columns.items()}
-    for first in range(0, len(numbers), BLOCK):
-        start_time, chunk = time.perf_counter(), numbers[first : first + BLOCK]
+    for first in range(0, len(numbers), DESIGNS_PER_BLOCK):
+        start_time, chunk = time.perf_counter(), numbers[first : first + DESIGNS_PER_BLOCK]
         columns = {name: column[chunk] for name, column in varied.items()}
         results = evaluate_columns(study.problem.posed, columns, study.report)
         if results is None:
@@ -208,7 +208,7 @@ def evaluate_rows(study: Study, numbers: NDArray[np.int64]) -> Iterator[Batch]:
         table: dict[str, Any] = {}
         for name, value in vars(results).items():
             table |= {header(name, n): x for n, x in value.items()} if isinstance(value, Mapping) else {name: value}
-        is_certain = table.pop("certain")
+        is_certain = table.pop("is_certain")
         if is_certain.any():
             seconds = (time.perf_counter() - start_time) / len(chunk)
             certain_table = {name: values[is_certain] for name, values in table.items()}

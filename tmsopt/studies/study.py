@@ -22,7 +22,7 @@ from tmsopt.errors import (
 )
 from tmsopt.models.expression import ExpressionError
 from tmsopt.problem.cases import Band
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.freedom import find_objective_faults
 from tmsopt.problem.limit import limit_value, replace_limit
 from tmsopt.problem.problem import Posed, Problem
@@ -134,7 +134,7 @@ class Study:
 
 
 def over_grid(
-    problem: Given,
+    problem: ProblemSource,
     axes: Mapping[str, Sequence[float]],
     *,
     title: str = "",

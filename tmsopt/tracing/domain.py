@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.models.user_spectrum import pattern_of
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, Truth, plain
@@ -88,7 +88,7 @@ class Domain(Printable):
 
 
 def domain(
-    problem: Given, *, step: float = STEP, starts: int = STARTS, seed: int = 0, progress: Listener | None = None
+    problem: ProblemSource, *, step: float = STEP, starts: int = STARTS, seed: int = 0, progress: Listener | None = None
 ) -> Domain:
     """Boundaries of stability and of heavy damping in the plane of the two free parameters.
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from tmsopt.errors import input_error
 from tmsopt.problem import Solution
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.tracing.branch import BranchPoint, table_at
 from tmsopt.tracing.continuation import CLOSED, CurvePoint, End, Walk, compute_tangent, follow
 from tmsopt.tracing.description import describe_end, find_events, make_branch
@@ -17,7 +17,7 @@ from tmsopt.tracing.trace import STARTS, STEP, check_options, locate_pattern
 
 
 def continue_from(
-    problem: Given,
+    problem: ProblemSource,
     pattern: str | None = None,
     *,
     through: Mapping[str, float] | None = None,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.errors import input_error
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, plain
@@ -86,7 +86,7 @@ class Swallowtail(Printable):
 
 
 def swallowtail(
-    problem: Given, rows: int = 48, across: int = 24, starts: int = STARTS, *, progress: Listener | None = None
+    problem: ProblemSource, rows: int = 48, across: int = 24, starts: int = STARTS, *, progress: Listener | None = None
 ) -> Swallowtail:
     """The surface of real negative double roots in the box of three free parameters: one, and an affine pair.
 

@@ -21,7 +21,7 @@ from tmsopt.errors import (
     table_faults,
 )
 from tmsopt.models.user_spectrum import pattern_of, patterns_of
-from tmsopt.problem.files import Given, pose
+from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
 from tmsopt.progress import Listener, start_steps
@@ -39,7 +39,7 @@ MOST = 200_000
 
 
 def trace(
-    problem: Given,
+    problem: ProblemSource,
     pattern: str | None = None,
     *,
     step: float = STEP,

@@ -76,7 +76,7 @@ def vanishes_modulo(x: Quotient, modulus: Quotient) -> bool:
 
 
 def list_coefficients(x: Quotient, variable: Quotient) -> Coefficients:
-    """Coefficients of a numerator with a single variable, in descending powers."""
+    """Coefficients of the numerator, which has a single variable, in descending powers."""
     terms = {powers[_index_of(x, variable)]: c for powers, c in x.numerator.to_dict().items()}
     return [terms.get(k, flint.fmpq(0)) for k in range(max(terms), -1, -1)]
 
@@ -158,12 +158,12 @@ def round_to_six(x: Any) -> Any:
     return rational(f"{float(x.mid()):.6f}")
 
 
-# Random rational bicycles, each with the five conditions of the paper, and its stability by Liénard–Chipart
+# Random rational bicycles, each with the five conditions of the paper and with its stability by Liénard–Chipart
 
 
 @cache
 def draw_sample() -> list[dict[str, Any]]:
-    """Random bicycles in which parameters, and Fr too, have both signs; see `describe_design`."""
+    """Random bicycles, in which parameters, and also Fr, have both signs; see `describe_design`."""
     return [describe_design(*design) for design in _draw_designs()]
 
 
@@ -206,7 +206,7 @@ _IMPORTED: Any = (copo, determinant, draw_sample, evaluate, isolated_roots, matr
 VOCABULARY: Mapping[str, Any] = {
     **{name: word for name, word in globals().items() if isfunction(word)},
     **{word.__name__: word for word in (*_BUILT_IN, *_IMPORTED)},
-    "laws": vars(laws),  # as the paper prints them; laws.NAME
+    "laws": vars(laws),  # laws as the paper prints them; an expression calls laws.NAME
     "SI_PARAMETERS": [name for name in tms.sets[1].names if name != "g"],
     "verdict_on": lambda printed, value: judge_decimal(printed, value).verdict,
     "ball": flint.arb,

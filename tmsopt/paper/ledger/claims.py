@@ -35,10 +35,11 @@ from tmsopt.paper.ledger.entry import (
     judge_identity,
     judge_statement,
 )
-from tmsopt.paper.ledger.language import Table, are_true, compute, open_scope, read_tables
+from tmsopt.paper.ledger.language import TomlTable, are_true, compute, open_scope, read_tables
 from tmsopt.progress import Listener, start_steps
 
 _TEXTS = ("printed", "remark", "otherwise", "condition", "against")
+"""Keys of a claim whose texts may contain values, as ``{name}``."""
 
 SOURCE = "O. N. Kirillov, Localizing EP sets in dissipative systems and the self-stability of bicycles (2018)"
 
@@ -74,18 +75,18 @@ def verify(progress: Listener | None = None, only: Sequence[str] = ()) -> Ledger
     return Ledger(SOURCE, tuple(entries))
 
 
-def select_claims(only: Sequence[str] = ()) -> tuple[Table, ...]:
+def select_claims(only: Sequence[str] = ()) -> tuple[TomlTable, ...]:
     """The claims whose keys match one of the patterns; all claims if there is no pattern."""
     return tuple(c for c in list_claims() if not only or any(fnmatchcase(c["key"], pattern) for pattern in only))
 
 
 @cache
-def list_claims() -> tuple[Table, ...]:
+def list_claims() -> tuple[TomlTable, ...]:
     """Every claim, in the order of the paper, with the title of its section."""
     return tuple({"section": s["title"], **claim} for s in read_tables()["section"] for claim in s["claim"])
 
 
-def compute_entry(claim: Table) -> Entry:
+def compute_entry(claim: TomlTable) -> Entry:
     """Compute the entry of a claim.
 
     Raises:
@@ -93,20 +94,20 @@ def compute_entry(claim: Table) -> Entry:
     """
     scope = open_scope(claim, {})
     formatted_values = {name: _FormattedValue(value) for name, value in scope.items()}
-    printed, remark, otherwise, condition, against = (
-        claim.get(field, "").format_map(formatted_values) for field in _TEXTS
+    printed, remark, failure_reason, condition, counterexample = (
+        claim.get(key, "").format_map(formatted_values) for key in _TEXTS
     )
     value = compute(claim.get("value", claim.get("computed", "''")), scope)
     computed = format_digits(value) if isinstance(value, flint.arb | flint.fmpq) else f"{_FormattedValue(value)}"
-    proved = are_true(claim.get("holds", []), scope)
+    is_proved = are_true(claim.get("holds", []), scope)
     match claim["rule"]:
         case "decimal":
             outcome = judge_decimal(printed, value, remark)
         case "identity":
-            outcome = judge_identity(proved, remark, otherwise)
+            outcome = judge_identity(is_proved, remark, failure_reason)
         case _:
-            refuted = are_true(claim["refutes"], scope)
-            outcome = judge_statement(condition, bool(condition) and proved, against, refuted, remark)
+            is_refuted = are_true(claim["refutes"], scope)
+            outcome = judge_statement(condition, bool(condition) and is_proved, counterexample, is_refuted, remark)
     if (outcome.verdict != EXACT and not outcome.remark) or not are_true(claim.get("noted", []), scope):
         raise ArithmeticError(f"{claim['key']}: '{outcome.verdict}' without an explanation that is proved")
     texts = {field: claim[field] for field in ("key", "section", "place", "statement", "route")}

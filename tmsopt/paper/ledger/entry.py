@@ -19,11 +19,11 @@ FAILS = "does not hold"
 VERDICTS = (EXACT, DIGITS_HOLD, DIGITS_OFF, CONDITIONAL, FAILS)
 """All verdicts, from the best to the worst."""
 
-SHOWN = 40
+_SHOWN_DIGITS = 40
 """Significant digits of a computed number."""
 
-_MAX_UNITS_OFF = 50  # `DIGITS_OFF` allows this many units of the last printed digit, so only two digits differ
-_MAX_RELATIVE_OFF = 1e-6  # `DIGITS_OFF` allows this relative difference
+_MAX_UNITS_OFF = 50  # largest difference for `DIGITS_OFF` in units of the last printed digit, so only two digits differ
+_MAX_RELATIVE_OFF = 1e-6  # largest relative difference for `DIGITS_OFF`
 
 
 class Judgement(NamedTuple):
@@ -66,8 +66,8 @@ class Ledger(Tabular):
     @property
     def counts(self) -> dict[str, int]:
         """Verdict → number of entries, for all verdicts."""
-        counted = Counter(entry.verdict for entry in self.entries)
-        return {verdict: counted[verdict] for verdict in VERDICTS}
+        counts = Counter(entry.verdict for entry in self.entries)
+        return {verdict: counts[verdict] for verdict in VERDICTS}
 
     def records(self) -> Iterable[dict[str, Any]]:
         """One record for each entry."""
@@ -83,7 +83,7 @@ class Ledger(Tabular):
 
 def format_digits(value: Any) -> str:
     """A ball or a fraction with 40 significant digits."""
-    return str(flint.arb(value).str(SHOWN, radius=False))
+    return str(flint.arb(value).str(_SHOWN_DIGITS, radius=False))
 
 
 def judge_decimal(printed: str, value: Any, remark: str = "") -> Judgement:
@@ -112,18 +112,20 @@ def judge_decimal(printed: str, value: Any, remark: str = "") -> Judgement:
     return Judgement(verdict, f"{words} {remark}".strip())
 
 
-def judge_identity(holds: bool, remark: str = "", otherwise: str = "") -> Judgement:
-    """Judge an identity: it is exact if the proof succeeds; otherwise it does not hold, for the reason `otherwise`."""
-    return Judgement(EXACT, remark) if holds else Judgement(FAILS, otherwise or "The proof does not run through.")
+def judge_identity(is_proved: bool, remark: str = "", reason: str = "") -> Judgement:
+    """Judge an identity: it is exact if the proof succeeds; otherwise it does not hold, for the given reason."""
+    return Judgement(EXACT, remark) if is_proved else Judgement(FAILS, reason or "The proof does not run through.")
 
 
-def judge_statement(condition: str, is_proved: bool, against: str, is_refuted: bool, remark: str = "") -> Judgement:
+def judge_statement(
+    condition: str, is_proved: bool, counterexample: str, is_refuted: bool, remark: str = ""
+) -> Judgement:
     """Judge a general statement that a counterexample refutes; it may be proved under a condition.
 
     Args:
         condition: the condition that must be added.
         is_proved: whether the proof under the condition succeeds.
-        against: the counterexample in words.
+        counterexample: the counterexample in words.
         is_refuted: whether the counterexample refutes the statement as printed.
 
     Raises:
@@ -133,5 +135,5 @@ def judge_statement(condition: str, is_proved: bool, against: str, is_refuted: b
         raise ArithmeticError(f"neither proved nor refuted: {condition}")
     condition_text = f"Condition: {condition}. " if is_proved else ""
     return Judgement(
-        CONDITIONAL if is_proved else FAILS, f"{condition_text}Counterexample: {against}. {remark}".strip()
+        CONDITIONAL if is_proved else FAILS, f"{condition_text}Counterexample: {counterexample}. {remark}".strip()
     )

@@ -21,7 +21,10 @@ from tmsopt.algebra.balls import rational
 from tmsopt.paper.ledger.algebra import PRECISION, VOCABULARY, make_ring, match_factors
 
 Scope = dict[str, Any]
-Table = Mapping[str, Any]
+"""Name → value, for the names that an expression may use."""
+
+TomlTable = Mapping[str, Any]
+"""A table of `claims.toml`."""
 
 _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add,
@@ -43,13 +46,13 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
 
 
 @cache
-def read_tables() -> Table:
+def read_tables() -> TomlTable:
     """The content of `claims.toml`."""
     return tomllib.loads(resources.files(__package__).joinpath("claims.toml").read_text(encoding="utf-8"))
 
 
 @cache
-def list_definitions() -> dict[str, tuple[list[str], Table]]:
+def list_definitions() -> dict[str, tuple[list[str], TomlTable]]:
     """Name under ``[define]`` → its parameters and its table; a text becomes the ``value`` of a table."""
     definitions = {}
     for head, table in read_tables()["define"].items():
@@ -72,8 +75,8 @@ def are_true(texts: Iterable[str], scope: Scope) -> bool:
     return all(compute(text, scope) is True for text in texts)
 
 
-def open_scope(table: Table, scope: Scope) -> Scope:
-    """A scope that adds the variables and definitions of a table, after those of its setting, to another scope."""
+def open_scope(table: TomlTable, scope: Scope) -> Scope:
+    """Another scope with the variables and definitions of a table; the definitions of its setting come first."""
     tables = read_tables()["setting"].get(table.get("setting"), {}), table
     new_scope = scope | make_ring(" ".join(part.get("variables", "") for part in tables))
     for line in (line for part in tables for line in part.get("where", ())):

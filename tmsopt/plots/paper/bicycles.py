@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from tmsopt.dynamics.growth import growth
 from tmsopt.models import tms
-from tmsopt.paper.experiment import SLACK, Experiment, experiment
+from tmsopt.paper.experiment import FLAT_SHARE, Experiment, experiment
 from tmsopt.paper.reference import benchmark, optimised_benchmark
 from tmsopt.paper.sketch import sketch
 from tmsopt.plots.bicycle import draw_bicycle, draw_distance
@@ -92,17 +92,17 @@ def draw_law(ax: Axes, data: Experiment) -> None:
 
 def draw_critical_speeds(ax: Axes, data: Experiment) -> None:
     """Draw Fr_c over χ_B for the geometry of the experimental bicycle, with the minima and the χ_B that was built."""
-    flat = rf"within {100 * SLACK:.0f} % of the minimum, $\chi_H = 1$"
-    ax.axvspan(*data.critical[0].flat, color=STABLE, alpha=0.25, linewidth=0, label=flat)
+    flat = rf"within {100 * FLAT_SHARE:.0f} % of the minimum, $\chi_H = 1$"
+    ax.axvspan(*data.critical[0].flat_range, color=STABLE, alpha=0.25, linewidth=0, label=flat)
     for curve, (colour, style) in zip(data.critical, _CURVES, strict=False):
         conditions = " (the law), any $\\mu$" if np.isnan(curve.mu) else rf" as built, $\mu = {curve.mu:g}$"
         ax.plot(curve.chi_B, curve.Fr_c, style, color=colour, label=rf"$\chi_H = {curve.chi_H:g}$" + conditions)
-        ax.plot(*curve.best, "v", color=colour, markeredgecolor="white")
+        ax.plot(*curve.minimum, "v", color=colour, markeredgecolor="white")
     ax.plot([], [], "v", color="0.3", label=r"minimum over $\chi_B$")
     chi_B = data.bicycles[0].parameters["chi_B"]
     words = rf"as built, $\chi_B = {chi_B:g}$"
     ax.axvline(chi_B, color=MARK)
-    speeds = [curve.own for curve in data.critical]
+    speeds = [curve.experimental_Fr_c for curve in data.critical]
     ax.plot(
         np.full(len(speeds), chi_B),
         speeds,
@@ -112,7 +112,7 @@ def draw_critical_speeds(ax: Axes, data: Experiment) -> None:
         label=words,
         **EDGE,
     )
-    least = np.nanmin([curve.best[1] for curve in data.critical])
+    least = np.nanmin([curve.minimum[1] for curve in data.critical])
     ax.set(xlim=(1, 2.05), ylim=(0.93 * least, 1.9 * least))
     ax.set(xlabel=r"$\chi_B$", ylabel=r"critical Froude number $\mathrm{Fr}_c$")
     ax.legend(loc="upper center")

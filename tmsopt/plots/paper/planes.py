@@ -173,10 +173,10 @@ def draw_planes(figure: Figure, panels: Sequence[Axes], planes: Sequence[Plane],
 
 
 def _draw_marked(ax: Axes, plane: Plane) -> list[Name]:
-    for place in plane.marked.values():
+    for place in plane.marked_points.values():
         ax.plot(*place, "o", color=MARK, markeredgecolor="white", zorder=6)
     words = {"least Fr_c": r"least $\mathrm{Fr}_c$"}
-    return [Name(words.get(name, name), *place) for name, place in plane.marked.items()]
+    return [Name(words.get(name, name), *place) for name, place in plane.marked_points.items()]
 
 
 def _shade_faces(faces: Array, colour: str) -> Array:

@@ -103,8 +103,8 @@ def _draw_paths(ax: Any, paths: Sequence[UniversalPath], columns: list[int]) -> 
         ax.plot(*visible_paths[-1].T, color=colour, gid="path", zorder=5, label=label)
         fill, stable_label = COMPLEX if path.name == "CEP2" else REAL, r"$\mathrm{Fr}$ where stability begins"
         marks = (
-            ("D", "white", path.stable, "stable", stable_label),
-            ("o", fill, path.exceptional, path.name, "on the EP set"),
+            ("D", "white", path.stability_onset, "stable", stable_label),
+            ("o", fill, path.exceptional_point, path.name, "on the EP set"),
         )
         for marker, marker_fill, place, name, label in marks:
             ax.plot(*place[columns, None], marker, mfc=marker_fill, mec=colour, zorder=6, gid=name, label=label)

@@ -5,7 +5,9 @@ import re
 _QUOTED = re.compile(r"\"(?:[^\"\\]|\\.)*\"|'[^']*'")
 _NUMBER = r"[+-]?\d[\d.]*(?:[eE][+-]?\d+)?"
 _BRACKETS = {"[": "]", "{": "}"}
-_MAX_LENGTH = 1000  # characters; a longer line gets no suggestion, because the search takes quadratic time
+_MAX_LENGTH = (
+    1000  # greatest number of characters; a longer line gets no suggestion, because the search takes quadratic time
+)
 
 
 def suggest_line(line: str) -> str:  # noqa: PLR0911 - one per case
@@ -18,8 +20,8 @@ def suggest_line(line: str) -> str:  # noqa: PLR0911 - one per case
         return "; a quote is missing"
     if comma := re.search(r"=\s*([+-]?\d+),(\d+)\s*([,}]|$)", unquoted):
         return f"; write a decimal point: {comma[1]}.{comma[2]}"
-    if share := re.search(rf"=\s*({_NUMBER})\s*%", unquoted):
-        return f"; write {float(share[1]) / 100:.12g} for {share[1]} %"
+    if percent := re.search(rf"=\s*({_NUMBER})\s*%", unquoted):
+        return f"; write {float(percent[1]) / 100:.12g} for {percent[1]} %"
     if re.search(rf"=\s*(?:{_NUMBER}\s*[+-]\s*)?{_NUMBER}[ij]\s*([,}}]|$)", unquoted):
         return "; parameters are real: write a complex number as two of them, kr + 1j*ki in H"
     if unit := re.search(rf"=\s*({_NUMBER}\s*[A-Za-z°µμ][\w°²/^*]*)\s*([,}}]|$)", unquoted):

@@ -10,7 +10,7 @@ from tmsopt.models.tables import read_table
 from tmsopt.models.user_spectrum import public_names
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES, root_names
 
-_MIN_SIMILARITY = 0.7  # if no name is at least so similar to an unknown name, the meanings are searched first
+_MIN_SIMILARITY = 0.7  # if no name is at least this similar to an unknown name, the meanings are searched first
 
 _EXAMPLES = (
     (1.0, 0.5, 2.0),
@@ -27,8 +27,8 @@ def vocabulary(model: Model, parameter_set: ParameterSet) -> dict[str, Parameter
     for k, n in zip(range(model.degree, -1, -1), model.coefficient_names(), strict=True):
         meaning = f"{words.get(k, f'coefficient of s^{k}')} in the characteristic polynomial"
         entries[n] = Quantity(n, "", meaning, f"a_{{{model.degree - k}}}", itemgetter(n))
-    derived = (*model.quantities, *parameter_set.quantities, *ROOT_QUANTITIES, NO_RADIUS)
-    entries |= {p.name: p for p in (*native, *parameter_set.parameters)} | {q.name: q for q in derived}
+    derived_quantities = (*model.quantities, *parameter_set.quantities, *ROOT_QUANTITIES, NO_RADIUS)
+    entries |= {p.name: p for p in (*native, *parameter_set.parameters)} | {q.name: q for q in derived_quantities}
     if model.carrier is not None:
         entries["abscissa"] = replace(ROOT_QUANTITIES[0], meaning="largest Im omega, gain less loss")
     names = (*parameter_set.names, *public_names(model, parameter_set), *root_names(model))
@@ -55,7 +55,7 @@ def suggest_name(name: str, model: Model, parameter_set: ParameterSet, accepted:
 
 
 def _suggest_model(name: str, model: Model) -> str:
-    """Suggest another bicycle model, if it has the name; else empty."""
+    """The advice to use another bicycle model that has the name; empty if there is none."""
     for candidate in MODELS.values() if model.name in MODELS else ():
         meanings = {p.name: p.meaning for s in candidate.sets for p in s.parameters}
         quantities = (*candidate.quantities, *(q for s in candidate.sets for q in s.quantities))
@@ -67,7 +67,7 @@ def _suggest_model(name: str, model: Model) -> str:
 
 def example_of(parameter: Parameter) -> tuple[str, str]:
     """A valid value and a valid range of a parameter, as lines of a file."""
-    value, low, high = next(u for u in _EXAMPLES if all(x in parameter.range for x in u))
+    value, low, high = next(numbers for numbers in _EXAMPLES if all(x in parameter.range for x in numbers))
     return f"{parameter.name} = {value}", f"{parameter.name} = {{ min = {low:g}, max = {high:g} }}"
 
 

@@ -26,11 +26,12 @@ class Relaxation:
         amounts: limit → how far it is relaxed, in its own units; the amount has a sign for an equality.
         conflict: limits that no design was found to meet together. An end of a range is one of them if a design beyond
             it meets the other limits.
-        alone: limit → how far it must be relaxed if no other limit is; confirmed by solving again.
-        irreducible: whether, without any one limit of the conflict, a design meets the others, although a full search
-            found none that meets all. Always false if limits on the roots allow a0 = 0, where narrow regions may hide.
+        alone: limit → how far it must be relaxed if no other limit is relaxed; confirmed by solving again.
+        irreducible: whether each limit of the conflict is necessary for it: without this limit a design meets the
+            others, and a full search found none that meets all. Always false if limits on the roots allow a0 = 0,
+            because a search may miss narrow regions there.
         remedies: sets of limits as a file would write them, the smallest change first. Each set is sufficient: the
-            problem was solved again with it, and the answer is stable if stability is wanted. Empty if none was found.
+            problem was solved again with it, and the answer is stable if stability was sought. Empty if none was found.
     """
 
     parameters: Table[float] = Table()
@@ -50,7 +51,7 @@ class RequiredValue:
     """The value of a fixed or bounded parameter that allows a design to meet every other limit.
 
     Attributes:
-        parameter: its name, such as the speed; the other parameters vary as the problem says.
+        parameter: name of the parameter, such as ``v``; the other parameters vary as the problem says.
         value: the nearest value with such a design; nan if none was found.
         most: whether it is the greatest such value; otherwise it is the least.
         looked: the range that was searched.
@@ -75,12 +76,12 @@ class RequiredValue:
         return plain(self, "parameter value shown most looked design")
 
 
-def round_outwards(x: float, up: bool, digits: int = DIGITS) -> float:
+def round_outwards(x: float, is_upward: bool, digits: int = DIGITS) -> float:
     """Round a number up or down to significant digits; 0 if it is not finite."""
     if not x or not math.isfinite(x):
         return 0.0
     step = 10.0 ** (math.floor(math.log10(abs(x))) - digits + 1)
-    return (math.ceil if up else math.floor)(round(x / step, 6)) * step
+    return (math.ceil if is_upward else math.floor)(round(x / step, 6)) * step
 
 
 def move_limits(problem: Posed, amounts: Numbers, digits: int = DIGITS) -> dict[str, str]:
@@ -114,7 +115,7 @@ def _move_limit(problem: Posed, name: str, amount: float, digits: int) -> str:
         parameter, _, end = name.rpartition(".")
         is_upper, unit = end == "max", unit_of(problem, name)
         end_value = problem.free[parameter][is_upper] + (amount if is_upper else -amount)
-        new_limit = round_outwards(end_value / unit.one, is_upper, digits)
+        new_limit = round_outwards(end_value / unit.factor, is_upper, digits)
         return f"{new_limit:.{DIGITS}g} {unit.text}".rstrip()
     text = problem.constraints[name]
     left, sign, right = written_sides(text)
@@ -122,7 +123,7 @@ def _move_limit(problem: Posed, name: str, amount: float, digits: int) -> str:
     if limit is None:
         increase = round_outwards(abs(amount), True, digits)
         return f"{left} {sign} {right} {'-' if sign == '>=' or amount < 0 else '+'} {increase:.{DIGITS}g}"
-    change = -amount if (sign == ">=") == bool(limit.before) else amount
+    change = -amount if (sign == ">=") == bool(limit.text_before) else amount
     new_limit, negligible = limit.value + change, _NEGLIGIBLE * abs(limit.value)
     return limit.replace_number(
         f"{round_outwards(new_limit, change > 0, digits) if abs(new_limit) > negligible else 0.0:.{DIGITS}g}"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 _FEW_BETTER = 0.2  # a search may end if at most this number of better optima that no start found is expected
 _LIKELY_BETTER = 0.5  # a better optimum is likely if more than this number is expected
-_EXTRA_RUNS = 2  # a search needs at least this number of solver runs more than optima found
+_EXTRA_RUNS = 2  # the solver must run at least this number of times more than there are different optima
 
 
 def expected_unseen(searches: int, optima: int) -> float:
@@ -29,10 +29,10 @@ def expects_few_better(searches: int, optima: int, limit: float = _FEW_BETTER) -
 class Starts:
     """The numbers of starts that were tried, that converged to a feasible point, and that ended at the best point.
 
-    A sampled design counts as a start if a descent leads from it to where another start ended.
+    A sampled design counts as a start if a descent leads from it to a point where another start ended.
 
     Attributes:
-        optima: number of different optima where starts ended, by the value of the objective or by place.
+        optima: number of optima where starts ended, with different values of the objective or different parameters.
         looked: number of other designs that were sampled, to choose starts and to check that none is better.
         runs: number of starts from which the solver ran.
 

@@ -5,6 +5,6 @@ from .readings import (
 )
 from .tables import TABLES as TABLES, read_numbers as read_numbers
 from .text import (
-    USUAL as USUAL, parse_exact_quantity as parse_exact_quantity, parse_quantity as parse_quantity,
+    COMMON_UNITS as COMMON_UNITS, parse_exact_quantity as parse_exact_quantity, parse_quantity as parse_quantity,
     pint_factor as pint_factor, unit_factor as unit_factor,
 )

@@ -19,12 +19,12 @@ _POWERS = re.compile(r"(?P<name>[^\s/^*]+)(\^(?P<power>-?\d+))?")
 class Dimension:
     """Base units with their powers in alphabetical order, and the value of a constant without units.
 
-    In a sum, a term without a unit is given the unit of the other terms. A sum of different units is `mixed`; it has
-    no unit.
+    In a sum, a term without a unit takes the unit of the other terms. A sum of different units has no unit; its
+    dimension `is_mixed`.
     """
 
     powers: tuple[tuple[str, Fraction], ...] = ()
-    mixed: bool = False
+    is_mixed: bool = False
     number: float = field(default=math.nan, compare=False)
 
     @classmethod
@@ -47,12 +47,12 @@ class Dimension:
 
 def _multiply(*factors: tuple[Dimension, Fraction | int]) -> Dimension:
     """The product of dimensions, each raised to a power."""
-    if any(factor.mixed for factor, _ in factors):
-        return Dimension(mixed=True)
+    if any(factor.is_mixed for factor, _ in factors):
+        return Dimension(is_mixed=True)
     powers: dict[str, Fraction] = {}
-    for factor, share in factors:
+    for factor, exponent in factors:
         for name, p in factor.powers:
-            powers[name] = powers.get(name, Fraction(0)) + share * p
+            powers[name] = powers.get(name, Fraction(0)) + exponent * p
     return Dimension(tuple(sorted((n, p) for n, p in powers.items() if p)))
 
 
@@ -65,8 +65,8 @@ def _raise_power(base: Dimension, exponent: Dimension) -> Dimension:
 
 def _add(*terms: Dimension) -> Dimension:
     units = {term.powers for term in terms if term.powers}
-    mixed = len(units) > 1 or any(term.mixed for term in terms)
-    return Dimension(() if mixed or not units else units.pop(), mixed)
+    is_mixed = len(units) > 1 or any(term.is_mixed for term in terms)
+    return Dimension(() if is_mixed or not units else units.pop(), is_mixed)
 
 
 UNITS = Kind(

@@ -10,13 +10,13 @@ from tmsopt.records import AnyNumbers
 Reading = float | tuple[float, ...]
 """A number, or one number for each root; nan if undefined."""
 
-_READ_IN = {"m": ("mm", 1000, 1), "m/s": ("km/h", 18, 5), "rad": ("deg", 180, None)}
+_READING_UNITS = {"m": ("mm", 1000, 1), "m/s": ("km/h", 18, 5), "rad": ("deg", 180, None)}
 """SI unit → unit of the reading, factor and divisor; the divisor None means π."""
 
-_TIMES = ("decay_rate", "decay_time", "frequency")
-"""Quantities that are not converted, because they already are readings."""
+_UNCONVERTED = ("decay_rate", "decay_time", "frequency")
+"""Quantities that are not converted, because they already are in 1/s, s and Hz."""
 
-READ_DIGITS = 15
+READING_DIGITS = 15
 """Digits of a converted reading; rounding to them makes 15 km/h read as 15 again."""
 
 
@@ -26,10 +26,10 @@ def convert_exactly(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str,
     Returns:
         The number, its unit, and the decimal digits to round it to: 0 if it was not converted.
     """
-    if unit not in _READ_IN:
+    if unit not in _READING_UNITS:
         return value, unit, 0
-    name, factor, divisor = _READ_IN[unit]
-    return value * factor / (divisor or pi), name, READ_DIGITS
+    name, factor, divisor = _READING_UNITS[unit]
+    return value * factor / (divisor or pi), name, READING_DIGITS
 
 
 def convert_to_reading(value: float, unit: str) -> tuple[float, str]:
@@ -61,10 +61,11 @@ def readings(
     roots: Iterable[Any],
     pi: Any = math.pi,
 ) -> Iterator[tuple[str, Any, int]]:
-    """Times, frequencies, and all numbers with a unit; the name ends with the unit: ``v_kmh``, ``x_B_mm``.
+    """Times, frequencies, and all numbers with a unit; nothing for a set of parameters that does not define seconds.
 
     Yields:
-        Name, number of any kind, and the decimal digits to round it to (0: none). Nothing for a set without seconds.
+        A name that ends with the unit (``v_kmh``, ``x_B_mm``), a number of any kind, and the decimal digits to round it
+        to; 0 for a number that is not rounded.
     """
     if parameter_set.rate is None:
         return
@@ -73,8 +74,8 @@ def readings(
     yield "growth_time_s", decay_time(-abscissa, rate), 0
     yield "frequencies_Hz", frequencies(roots, rate, pi), 0
     units = {p.name: p.unit for p in parameter_set.parameters}
-    units |= {q.name: q.unit for q in parameter_set.quantities if q.name not in _TIMES}
+    units |= {q.name: q.unit for q in parameter_set.quantities if q.name not in _UNCONVERTED}
     for name in (n for n, unit in units.items() if unit != "1"):
         value = parameters[name] if name in parameters else quantities[name]
-        read, unit, digits = convert_exactly(value, units[name], pi)
-        yield f"{name}_{''.join(filter(str.isalnum, unit))}", read, digits
+        reading, unit, digits = convert_exactly(value, units[name], pi)
+        yield f"{name}_{''.join(filter(str.isalnum, unit))}", reading, digits

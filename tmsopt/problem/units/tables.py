@@ -9,29 +9,29 @@ from typing import Any
 from tmsopt.errors import Fault
 from tmsopt.models import ParameterSet, decimal
 from tmsopt.models.exact import Exact
-from tmsopt.problem.units.text import LONGEST, parse_exact_quantity
+from tmsopt.problem.units.text import MAX_LENGTH, parse_exact_quantity
 from tmsopt.records import AnyNumbers
 
 TABLES = ("free", "fixed", "start", "scenarios", "tolerances", "weights")
 """Tables of a problem that contain numbers. A parameter has the first unit that was typed for it, in this order."""
 
-Typed = dict[str, dict[float, str]]
-"""Parameter → double → the exact number that was typed, if the double's decimal differs."""
+TypedNumbers = dict[str, dict[float, str]]
+"""Parameter → double → the exact number that was typed, if the decimal of the double differs from it."""
 
 
 def read_numbers(
     tables: AnyNumbers, parameter_set: ParameterSet
-) -> tuple[dict[str, Any], dict[str, str], Typed, list[Fault]]:
+) -> tuple[dict[str, Any], dict[str, str], TypedNumbers, list[Fault]]:
     """Convert texts such as "25 cm" in the tables of a problem to numbers.
 
     Args:
         tables: the tables named in `TABLES`, of numbers and texts.
 
     Returns:
-        The tables in numbers, the typed units by parameter, the exact numbers that were typed, and the faults.
+        The tables with numbers only, parameter → typed unit, the exact numbers that were typed, and the faults.
     """
     units: dict[str, str] = {}
-    typed: Typed = {}
+    typed: TypedNumbers = {}
     faults: list[Fault] = []
 
     def number(value: Any, table: str, name: str, *end: str) -> Any:
@@ -43,9 +43,9 @@ def read_numbers(
         try:
             result: Any
             if isinstance(value, str):
-                result, written, exact = parse_exact_quantity(value, unit)
+                result, typed_unit, exact = parse_exact_quantity(value, unit)
             else:
-                result, written, exact = value, "", Exact.from_fraction(Fraction(value))
+                result, typed_unit, exact = value, "", Exact.from_fraction(Fraction(value))
             if not is_size and exact and exact.fraction != decimal(float(result)):
                 typed.setdefault(name, {})[float(result)] = str(exact)
         except OverflowError:  # an integer too large for a double
@@ -53,8 +53,8 @@ def read_numbers(
         except ValueError as error:
             faults.append(Fault(f"{error}{_suggest_text(value)}", (table, name, *end)))
             return value
-        if written and not is_size:
-            units.setdefault(name, written)
+        if typed_unit and not is_size:
+            units.setdefault(name, typed_unit)
         return result
 
     def read_table(table: str, key: str) -> Iterator[tuple[str, Any]]:
@@ -77,12 +77,11 @@ def read_numbers(
 
 def _suggest_text(text: object) -> str:
     """The end of an error message that says what to write; empty without a suggestion."""
-    if not isinstance(text, str) or len(text) > LONGEST:
+    if not isinstance(text, str) or len(text) > MAX_LENGTH:
         return ""
     if comma := re.fullmatch(r"\s*([+-]?\d+),(\d+.*)", text):
         return f'; write a decimal point: "{comma[1]}.{comma[2]}"'
-    if share := re.fullmatch(r"\s*([+-]?\d+\.?\d*)\s*%\s*", text):
-        return (
-            f"; write {float(share[1]) / 100:.12g} for a share of {share[1]} %; {share[1]} % of a value as its amount"
-        )
+    if percent := re.fullmatch(r"\s*([+-]?\d+\.?\d*)\s*%\s*", text):
+        share = f"{percent[1]} %"
+        return f"; for {share}, write {float(percent[1]) / 100:.12g}; for {share} of a value, write the amount"
     return ""

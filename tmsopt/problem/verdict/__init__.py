@@ -1,4 +1,4 @@
-"""Verdicts: decides from facts alone how a solution is described.
+"""Verdicts: describes a solution in words, from facts only.
 
 In: facts such as an abscissa, Jordan chains, a status. Out: a word or a phrase. Open `stability` first, then `status`;
 `meetings` finds the eigenvectors of multiple roots.

@@ -1,7 +1,7 @@
 """Finds the number of eigenvectors of multiple roots, from ranks of the model's matrices.
 
-At a multiple root several roots meet. If it has several eigenvectors the roots cross; with one eigenvector it is an
-exceptional point (EP).
+A *meeting* is a multiple root: several roots meet there. If it has several eigenvectors, we say that the roots *cross*.
+If it has one eigenvector, it is an exceptional point (EP).
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -19,27 +19,28 @@ from tmsopt.roots.jordan import equilibrate
 from tmsopt.roots.patterns.structure import fit_unknowns
 
 _RANK_TOLERANCE = 1e-10  # a relative singular value below this counts as 0
-# Singular values below this may be 0 at a design near by; those of a double root are at most about √1e-10.
+# Singular values below this may be 0 at a nearby design; those of a double root are at most about √1e-10.
 _NEARLY_SINGULAR = 1e-3
 _MAX_DISTANCE = 3e-5  # greatest distance of a crossing from the design, as a share of the box
-_STEP, _STEPS = 1e-6, 6  # difference step as a share of the box; number of Gauss–Newton steps
-_ZERO_BLOCK = 1e-12  # a block of the matrix that is smaller, relative to the terms of the matrices, counts as 0
+_DIFFERENCE_STEP = 1e-6  # step of finite differences, as a share of the box
+_MAX_NEWTON_STEPS = 6  # greatest number of Gauss–Newton steps
+_ZERO_BLOCK = 1e-12  # a block of the matrix counts as 0 if it is below this share of the terms of the matrices
 _SAME_ROOT = 1e-6  # relative distance within which two roots are the same
 _MIN_UNIT = 1e-3  # least unit for scaling the matrices at a root, as a share of the largest root
 
 
 def meetings(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
-    """The multiple roots among the roots of a design's polynomial, converted to those of the user's system.
+    """The multiple roots among the roots of a design's polynomial, converted to roots of the user's system.
 
     The rightmost root comes first.
     """
     multiple_roots: list[MultipleRoot] = []
-    of_H = problem.model.carrier is not None
+    is_complex = problem.model.carrier is not None
     for root in roots:
-        if root.multiplicity > 1 and (root.im < 0 if of_H else root.im >= 0):
+        if root.multiplicity > 1 and (root.im < 0 if is_complex else root.im >= 0):
             (user_root,) = user_roots(problem.model, [root])
             meeting = _find_eigenvectors(problem, parameters, root, user_root, roots)
-            multiple_roots += [meeting] if of_H or not root.im else [meeting, replace(meeting, im=-root.im)]
+            multiple_roots += [meeting] if is_complex or not root.im else [meeting, replace(meeting, im=-root.im)]
     return tuple(sorted(multiple_roots, key=lambda m: (-m.re, -m.im)))
 
 
@@ -70,12 +71,12 @@ def _located_roots(problem: Posed, pattern: Pattern, parameters: Numbers) -> lis
     ]
 
 
-def every_meeting(
-    problem: Posed, parameters: Numbers, roots: Sequence[Root], violated: Collection[str]
+def all_meetings(
+    problem: Posed, parameters: Numbers, roots: Sequence[Root], violated_names: Collection[str]
 ) -> tuple[MultipleRoot, ...]:
-    """The multiple roots of a solution: first those of its pattern, unless it is violated, then the others."""
+    """The multiple roots of a solution: first the roots of its pattern, unless it is violated, then the others."""
     root_meetings, pattern = meetings(problem, parameters, roots), problem.pattern
-    is_violated = any(name in violated for name in problem.located)
+    is_violated = any(name in violated_names for name in problem.located)
     located = located_meetings(problem, pattern, parameters) if pattern is not None and not is_violated else ()
     pattern_meetings = [m for m in root_meetings if any(_is_near(m, other) for other in located)]
     further_meetings = [m for m in located if not any(_is_near(m, other) for other in root_meetings)]
@@ -109,8 +110,8 @@ def _find_eigenvectors(
     design, s = _find_crossing(problem, parameters, _number(root), k, unit)
     matrices = pencil(problem.parameter_set.native({n: flint.arb(x) for n, x in design.items()}))
     chains = jordan(matrices, flint.acb(s.real, s.imag), k, _RANK_TOLERANCE, unit)
-    partial = chains.partial or (k - chains.geometric + 1,)
-    return MultipleRoot(user_root.re, user_root.im, k, chains.geometric, partial[0])
+    chain_lengths = chains.partial or (k - chains.geometric + 1,)
+    return MultipleRoot(user_root.re, user_root.im, k, chains.geometric, longest=chain_lengths[0])
 
 
 def _unit(root: Root, roots: Sequence[Root]) -> float:
@@ -119,17 +120,17 @@ def _unit(root: Root, roots: Sequence[Root]) -> float:
 
 
 def _find_crossing(problem: Posed, parameters: Numbers, s: complex, k: int, unit: float) -> tuple[Numbers, complex]:
-    """The crossing near a design and its root; the design itself if there is none nearby.
+    """The crossing near a design and its root; without a crossing nearby, the design and s.
 
-    Coefficients determine a crossing with half of their digits only, so the design may be 1e-5 away from it. L(s) is
-    the matrix polynomial. At the crossing its block of the smallest singular values is 0, which is a regular equation
-    for the parameters.
+    Coefficients determine a crossing with half of their digits only, so the design may be 1e-5 away from it. At the
+    crossing, several of the smallest singular values of the matrix polynomial L(s) are 0. The block of L(s) between
+    their singular vectors is therefore 0 too, which is a regular equation for the parameters.
     """
     free = [n for n, (low, high) in problem.free.items() if high > low]
     start = np.array([*(float(parameters[n]) for n in free), s.real, s.imag])
     widths = np.array([*(problem.free[n][1] - problem.free[n][0] for n in free), unit, unit])
     size, scale = equilibrate(_matrices(problem, parameters), unit)
-    scale = scale / np.linalg.norm(size * scale, 2)  # constant, so that it does not jump with the entries
+    scale = scale / np.linalg.norm(size * scale, 2)  # a constant scale, so that it does not jump with the entries
 
     def design_at(x: Array) -> dict[str, float]:
         return {**parameters, **dict(zip(free, x.tolist(), strict=False))}
@@ -138,9 +139,9 @@ def _find_crossing(problem: Posed, parameters: Numbers, s: complex, k: int, unit
         matrix = np.polyval(_matrices(problem, design_at(x)), complex(*x[-2:]))
         return np.asarray(scale * matrix, dtype=complex)
 
-    for count in range(k, 1, -1):
+    for count in range(k, 1, -1):  # number of singular values that become 0
         x = start
-        for _ in range(_STEPS):
+        for _ in range(_MAX_NEWTON_STEPS):
             left_vectors, values, right_vectors = np.linalg.svd(scaled_matrix(x))
             if count > len(values) or values[-count] > _NEARLY_SINGULAR:
                 break
@@ -161,12 +162,12 @@ def _matrices(problem: Posed, parameters: Numbers) -> list[Array]:
 def _newton_step(
     scaled_matrix: Callable[[Array], Complex], x: Array, widths: Array, left_vectors: Complex, right_vectors: Complex
 ) -> Array:
-    """A Gauss–Newton step towards a block of L that is 0, in shares of the box and of the unit of the root."""
+    """A Gauss–Newton step towards a zero block of L(s), in shares of the box and of the unit of the root."""
 
     def block(point: Array) -> Array:
         B = (left_vectors.conj().T @ scaled_matrix(point) @ right_vectors.conj().T).ravel()
         return np.concatenate([B.real, B.imag])
 
     base = block(x)
-    columns = [(block(x + _STEP * move) - base) / _STEP for move in np.diag(widths)]
+    columns = [(block(x + _DIFFERENCE_STEP * move) - base) / _DIFFERENCE_STEP for move in np.diag(widths)]
     return np.asarray(np.linalg.lstsq(np.array(columns).T, -base, rcond=1e-9)[0])

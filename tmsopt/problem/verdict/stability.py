@@ -14,7 +14,7 @@ STABLE, MARGINAL, GROWING, EDGE, UNSTABLE = (
     "on the edge of stability",
     "not stable",
 )
-"""Verdicts. `EDGE` is for a root at infinity, whose side is unknown."""
+"""Verdicts. `EDGE` is for a root at infinity, which may lie on either side of the axis."""
 
 CROSSING = "diabolic point (semisimple), not an EP"
 """Name of a multiple root with as many eigenvectors as its multiplicity."""
@@ -22,11 +22,16 @@ CROSSING = "diabolic point (semisimple), not an EP"
 ROUNDED = ", up to rounding errors"
 """Added to a verdict that holds in doubles but was not confirmed in exact arithmetic."""
 
-_ROUNDING_FACTOR, _MAX_ROUNDING = 2.0, 1e-6
-"""An ideal abscissa counts as 0 if it is at most `_ROUNDING_FACTOR` times its difference from the abscissa as stored,
-and at most `_MAX_ROUNDING` times the largest root. The difference shows the effect of rounding on multiple roots."""
+_ROUNDING_FACTOR = 2.0
+"""The ideal abscissa counts as 0 if it is at most this factor times its difference from the abscissa as stored.
 
-_LINE = 1e-12
+The difference shows the effect of rounding on multiple roots.
+"""
+
+_MAX_ROUNDING = 1e-6
+"""The ideal abscissa does not count as 0 if it is above this share of the largest root."""
+
+_SAME_REAL_PART = 1e-12
 """Real parts count as equal if they differ by less than this share of the largest root."""
 
 
@@ -49,12 +54,12 @@ class MultipleRoot:
 
     @property
     def defective(self) -> bool | None:
-        """Whether it has fewer eigenvectors than its multiplicity; None if unknown."""
+        """Whether the root has fewer eigenvectors than its multiplicity; None if unknown."""
         return None if self.geometric is None else self.geometric < self.multiplicity
 
     @property
     def exceptional(self) -> bool:
-        """Whether it may be an exceptional point of its order: one eigenvector, or an unknown number."""
+        """Whether the root may be an exceptional point: it has one eigenvector, or their number is unknown."""
         return self.geometric in (1, None)
 
 
@@ -65,7 +70,7 @@ def power_of_t(longest: int) -> str:
 
 def longest_chain_on_line(meetings: Iterable[MultipleRoot], abscissa: float, largest: float) -> int | None:
     """Length of the longest Jordan chain on the rightmost line; None if no root on it is multiple."""
-    return max((m.longest for m in meetings if m.re >= abscissa - _LINE * largest), default=None)
+    return max((m.longest for m in meetings if m.re >= abscissa - _SAME_REAL_PART * largest), default=None)
 
 
 @dataclass(frozen=True)
@@ -91,27 +96,28 @@ class StabilityVerdict:
 
 
 def stability(
-    ends: tuple[float, float], edges: Collection[str], meetings: Iterable[MultipleRoot] = (), largest: float = 0.0
+    abscissas: tuple[float, float], edges: Collection[str], meetings: Iterable[MultipleRoot] = (), largest: float = 0.0
 ) -> StabilityVerdict:
     """The verdict on a solution.
 
     Args:
-        ends: the abscissa of the ideal solution and the abscissa as stored; they differ by the effect of rounding.
+        abscissas: of the ideal solution, and of its parameters as stored; they differ by the effect of rounding.
         edges: boundaries of stability that contain the solution, such as ``weave``.
         meetings: multiple roots of the solution.
         largest: size of the largest root.
     """
-    if not all(map(math.isfinite, ends)):
+    ideal, stored = abscissas
+    if not math.isfinite(ideal) or not math.isfinite(stored):
         return StabilityVerdict("")
-    rounding = min(_ROUNDING_FACTOR * abs(ends[0] - ends[1]), _MAX_ROUNDING * largest)
-    if not edges and not min(ends) <= 0 <= max(ends) and abs(ends[0]) > rounding:
-        return StabilityVerdict(STABLE if max(ends) < 0 else UNSTABLE)
-    growth = power_of_t(longest_chain_on_line(meetings, ends[0], largest) or 1)
+    rounding = min(_ROUNDING_FACTOR * abs(ideal - stored), _MAX_ROUNDING * largest)
+    if not edges and not min(abscissas) <= 0 <= max(abscissas) and abs(ideal) > rounding:
+        return StabilityVerdict(STABLE if ideal < 0 else UNSTABLE)
+    growth = power_of_t(longest_chain_on_line(meetings, ideal, largest) or 1)
     return StabilityVerdict(GROWING if growth else EDGE if "infinity" in edges else MARGINAL, growth)
 
 
 def roots_to_json(solution: Any) -> dict[str, Any]:
-    """JSON of the roots. Facts on multiple roots are given for the whole solution and in the entry of each root.
+    """JSON of the roots. The facts on multiple roots stand at the top level and in the entry of each multiple root.
 
     Args:
         solution: an object with `roots`, `eigenfrequencies`, `meetings` and `stability`.
@@ -119,7 +125,7 @@ def roots_to_json(solution: Any) -> dict[str, Any]:
     growth_power: str = solution.stability.growth
     data: dict[str, Any] = {}
     largest_re = max((m.re for m in solution.meetings if m.longest > 1), default=math.nan)
-    tolerance = _LINE * max((r.size for r in solution.roots), default=0.0)  # a root of 1e-17 is shown as 0
+    tolerance = _SAME_REAL_PART * max((r.size for r in solution.roots), default=0.0)  # a root of 1e-17 is shown as 0
 
     def chain_facts(m: MultipleRoot) -> dict[str, Any]:
         growth = {"growth": power_of_t(m.longest)} if growth_power and m.re == largest_re and m.longest > 1 else {}
@@ -134,20 +140,22 @@ def roots_to_json(solution: Any) -> dict[str, Any]:
     return facts | data
 
 
-def describe_stability(verdict: StabilityVerdict, *, exact: bool, of_matrices: bool, of_H: bool = False) -> str:
+def describe_stability(
+    verdict: StabilityVerdict, *, is_exact: bool, has_matrices: bool, is_complex: bool = False
+) -> str:
     """A verdict for a headline.
 
     Args:
-        exact: whether roots on the axis and their chains were confirmed in exact arithmetic.
-        of_matrices: whether Jordan chains are known from matrices; coefficients give only p(d/dt) y = 0.
-        of_H: whether the system is complex, so that the roots are eigenfrequencies.
+        is_exact: whether roots on the axis and their chains were confirmed in exact arithmetic.
+        has_matrices: whether Jordan chains are known from matrices; coefficients give only p(d/dt) y = 0.
+        is_complex: whether the system is a complex H, so that the roots are eigenfrequencies.
     """
     if not verdict.on_edge:
         return verdict.verdict
-    root = "real eigenfrequency" if of_H else "root on the imaginary axis"
-    reason = f"from a defective {root}" if of_matrices else "as the solutions of p(d/dt) y = 0 do"
+    root = "real eigenfrequency" if is_complex else "root on the imaginary axis"
+    reason = f"from a defective {root}" if has_matrices else "as the solutions of p(d/dt) y = 0 do"
     words = f"growing as {verdict.growth}, {reason}" if verdict.growth else verdict.verdict
-    return words if exact else f"{words}{ROUNDED}"
+    return words if is_exact else f"{words}{ROUNDED}"
 
 
 def describe_crossing(meeting: MultipleRoot) -> str:

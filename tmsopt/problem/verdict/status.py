@@ -35,7 +35,7 @@ def describe_status(solution: "Solution") -> str:
 
 
 def describe_verdict(solution: "Solution") -> str:
-    """The stability of a solution in words; if stability was sought in vain, also whether any design is stable."""
+    """The stability of a solution in words; if no stable design was found, also whether one exists."""
     problem, any_stable, stability = solution.problem, solution.any_stable, solution.stability
     located_none = problem.posed.sense == "locate" and solution.status == "not_converged"
     if located_none or (solution.status == "infeasible" and any_stable is not False):
@@ -50,9 +50,9 @@ def describe_verdict(solution: "Solution") -> str:
         model = problem.model
         words = describe_stability(
             stability,
-            exact=solution.edge_is_exact,
-            of_matrices=model.pencil is not None,
-            of_H=model.carrier is not None,
+            is_exact=solution.edge_is_exact,
+            has_matrices=model.pencil is not None,
+            is_complex=model.carrier is not None,
         )
         return f"{words}; {remark}" if stability.on_edge and is_sought and remark else words
     if any_stable:
@@ -67,9 +67,9 @@ class NotSolved(RuntimeError):
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # no abscissa below -1
-        >>> asked = tmsopt.Problem(swing, free={"c": (0, 3)}, minimize="c", constraints={"fast": "abscissa <= -2"})
+        >>> fast = tmsopt.Problem(swing, free={"c": (0, 3)}, minimize="c", constraints={"decay": "abscissa <= -2"})
         >>> try:
-        ...     tmsopt.solve(asked)
+        ...     tmsopt.solve(fast)
         ... except tmsopt.NotSolved as error:
         ...     print(error.solution.status)
         infeasible

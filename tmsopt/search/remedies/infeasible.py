@@ -17,7 +17,7 @@ from tmsopt.errors import InputError
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem import Posed, Relaxation, Starts, move_limits, replace_limits
 from tmsopt.problem.advice.remedies import DIGITS
-from tmsopt.problem.dependence import STABLE, stability_limit
+from tmsopt.problem.dependence import STABILITY_CONSTRAINT, stability_limit
 from tmsopt.problem.verdict.meetings import nearest_crossing
 from tmsopt.program import Options
 from tmsopt.program.formulate import default_start, formulate
@@ -175,7 +175,7 @@ class _RemedySearch:
         *_, elastic = list_stages(problem, replace(self.options, starts=_FEW_STARTS))
         if not stability and elastic.problem.free == wide_problem.free:
             return ()
-        elastic = replace(elastic, limits=[limit for limit in elastic.limits if limit.name != STABLE])
+        elastic = replace(elastic, limits=[limit for limit in elastic.limits if limit.name != STABILITY_CONSTRAINT])
         relaxation, _ = elastic.find_least_relaxation()
         if relaxation is None:
             return ()

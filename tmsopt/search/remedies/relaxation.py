@@ -10,7 +10,7 @@ from tmsopt.algebra import NODES, fold
 from tmsopt.algebra.formula import formula, symbol
 from tmsopt.algebra.kinds import atan
 from tmsopt.evaluation import find_worst_cases
-from tmsopt.evaluation.recheck import FEASIBLE, measure_excesses, recheck
+from tmsopt.evaluation.recheck import FEASIBILITY_TOLERANCE, measure_excesses, recheck
 from tmsopt.models import Values
 from tmsopt.problem import Case, Posed, Relaxation
 from tmsopt.program import NLP, Options
@@ -161,7 +161,9 @@ class ElasticProblem:
         cases = trial.end.nlp.cases
         worst = [w.case for w in find_worst_cases(self.problem, trial.parameters).values()]
         amounts, needed = (self._compute_amounts(trial.parameters, c) for c in (cases, (*cases, *worst)))
-        has_grown = any(abs(a) > abs(amounts.get(n, 0.0)) + FEASIBLE * (1 + abs(a)) for n, a in needed.items())
+        has_grown = any(
+            abs(a) > abs(amounts.get(n, 0.0)) + FEASIBILITY_TOLERANCE * (1 + abs(a)) for n, a in needed.items()
+        )
         return [case for case in worst if case not in cases] if has_grown else []
 
     def _compute_amounts(self, parameters: Mapping[str, float], cases: Sequence[Case]) -> dict[str, float]:
@@ -172,7 +174,7 @@ class ElasticProblem:
                 excess = parameters[limit.parameter] - limit.end
                 needed[limit.name] = max(excess if limit.is_upper else -excess, 0.0)
         amounts = {limit: needed.get(limit.name, 0.0) for limit in self.limits}
-        return {k.name: a * (1 + _ROUND_UP) for k, a in amounts.items() if abs(a) > FEASIBLE * k.scale}
+        return {k.name: a * (1 + _ROUND_UP) for k, a in amounts.items() if abs(a) > FEASIBILITY_TOLERANCE * k.scale}
 
     def _build_program(self, cases: Sequence[Case]) -> NLP:
         """Build the program that minimises Σ slack/scale: each limit moves by its slack, all others stay."""

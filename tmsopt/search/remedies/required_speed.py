@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from tmsopt.problem import Posed, Solution, unit_of
 from tmsopt.problem.advice.remedies import DIGITS, RequiredValue, round_outwards
-from tmsopt.problem.dependence import STABLE
+from tmsopt.problem.dependence import STABILITY_CONSTRAINT
 from tmsopt.program import Options
 from tmsopt.progress import begin
 from tmsopt.records import Table
@@ -31,7 +31,7 @@ def add_required_speed(solution: Solution, options: Options) -> Solution:
     name = _find_speed(problem)
     if not name or problem.cases or not problem.free or not _can_speed_help(solution):
         return solution
-    limits = {} if problem.asked_of_roots or problem.pattern else {STABLE: "abscissa <= 0"}
+    limits = {} if problem.asked_of_roots or problem.pattern else {STABILITY_CONSTRAINT: "abscissa <= 0"}
     short_options = replace(options, starts=SHORT_SEARCH_STARTS, progress=None, near=None)
     began, searched_ends = time.perf_counter(), list[float]()
     begin(options.progress, f"searching for the {name} that makes it feasible")
@@ -45,7 +45,7 @@ def add_required_speed(solution: Solution, options: Options) -> Solution:
             design = (max if is_maximum else min)(designs, key=lambda p: p[name])
             if name in problem.free and math.isclose(design[name], ends[is_maximum], rel_tol=_AT_RANGE_END):
                 return solution  # a speed in the box is enough
-            limited_options, unit_size = limit_time(options), unit_of(problem, name).one
+            limited_options, unit_size = limit_time(options), unit_of(problem, name).factor
             rounded_speeds = [
                 round_outwards(design[name] / unit_size, not is_maximum, digits) * unit_size
                 for digits in (DIGITS, 4, 2)
