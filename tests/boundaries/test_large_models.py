@@ -23,7 +23,7 @@ PENCIL = (
 def test_a_nearest_point_is_the_same_by_either_second_derivative(model, edge, monkeypatch):
     found = []
     for large in (0, np.inf):  # operations from which expressions are not expanded
-        monkeypatch.setattr(nlp, "_LARGE", large)
+        monkeypatch.setattr(nlp, "_MAX_EXPRESSION_COST", large)
         nlp._PROGRAMS.get.cache_clear()
         problem = tmsopt.Problem(model, fixed={"x": 0.3, "y": 0.4, "z": 0.2})
         found.append(tmsopt.nearest(problem, edge, weights={"x": 1.0, "y": 0.5}))
