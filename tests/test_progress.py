@@ -43,7 +43,7 @@ VERBS = [
     ("searching", partial(prepare_study, DRAWN)),
     ("drawing designs", lambda **told: tmsopt.monte_carlo(optimum(), 20, tolerances={"mu": 0.01}, **told)),
     ("moving limits", partial(tmsopt.explain, "problems/realistic.toml")),
-    ("judging the optimum", lambda **told: tmsopt.optimality(optimum(), **told)),
+    ("checking the optimum", lambda **told: tmsopt.optimality(optimum(), **told)),
     ("splitting roots", lambda **told: tmsopt.diagnose(optimum(), **told)),
     ("writing the page", partial(tmsopt.explore, EP4)),
     ("recomputing claims", partial(tmsopt.verify, only=["tab1-*"])),

@@ -45,7 +45,7 @@ KILLED = """
 import os, signal, sys
 from helpers.charts import charted
 from tmsopt.charts import folder
-left, folder._SYNC = int(sys.argv[2]), 0.0
+left, folder._SYNC_INTERVAL = int(sys.argv[2]), 0.0
 real = os.fsync
 def fsync(descriptor):
     global left

@@ -94,7 +94,7 @@ def test_an_interrupt_leaves_the_points_that_are_known(monkeypatch):
 
 
 def test_an_interrupt_before_any_end_is_known_is_raised(monkeypatch):
-    monkeypatch.setattr(pareto, "minimise_alone", lambda ask, k: _stop())
+    monkeypatch.setattr(pareto, "minimise_without_limits", lambda ask, k: _stop())
     with pytest.raises(KeyboardInterrupt):
         tmsopt.pareto(PROBLEM, 5, workers=1)
 

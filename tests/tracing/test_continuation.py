@@ -114,7 +114,7 @@ def test_folds_are_passed_and_limits_met_exactly():
     assert np.abs(y**3 - y - x).max() <= 10 * ROUNDING
     assert np.all(np.diff(y) > 0) or np.all(np.diff(y) < 0)
     assert {round(v, 12) for v in (x[0], x[-1])} == {-6.0, 6.0}
-    reached = {(walked.ends[k].reason, walked.ends[k].limit) for k in (0, 1)}
+    reached = {(walked.ends[k].reason, walked.ends[k].variable) for k in (0, 1)}
     assert reached <= {("min", 0), ("max", 0), ("min", 1), ("max", 1)}  # (±6, ±2) is a corner of the box
     turns = np.flatnonzero(np.diff(np.sign(walked.t[:, 0])))
     assert len(turns) == 2
@@ -154,7 +154,7 @@ def test_a_cusp_is_a_singular_end():
     on = plane(lambda x, y: y * y - x**3, lower=[-1, -1], upper=[1, 1])
     walked = walk(on, np.array([0.25, 0.125]), np.array([-1.0, -0.75]) / 1.25, 0.01, 10**5)
     assert walked.ends[1].reason.startswith("singular")
-    assert walked.ends[1].limit is None
+    assert walked.ends[1].variable is None
     assert np.hypot(*walked.y[-1]) < 1e-3
     assert np.all(walked.y[:, 1] >= -1e-7)  # not onto the other half; at the cusp y is right to the root of rounding
 

@@ -20,17 +20,17 @@ from tmsopt.records import Array, Table
 
 _LONGEST_STEP = 0.05  # longest step, relative to the sizes of the variables
 _STEP_RATIO = 4.0  # ratio of successive steps
-_STEPS = 9  # number of steps; the shortest is 7e-7 of the sizes
-_ITERATIONS = 12  # most iterations of Newton's method
-_MIN_IMPROVEMENT = 1e-9  # smallest improvement, relative to the objective, that rounding does not explain
+_STEP_COUNT = 9  # number of steps; the shortest is 7e-7 of the sizes
+_MAX_ITERATIONS = 12  # largest number of iterations of Newton's method
+_MIN_IMPROVEMENT = 1e-9  # smallest improvement, relative to the objective, that is larger than rounding errors
 
 
 @dataclass(frozen=True)
 class BetterDesign:
-    """A design with a better objective, rechecked.
+    """A rechecked design with a better objective.
 
     Attributes:
-        order: 1 if the objective decreases to first order, 2 if by curvature.
+        order: 1 if the objective improves to first order, 2 if it improves by its curvature.
     """
 
     parameters: Table[float]
@@ -39,30 +39,30 @@ class BetterDesign:
 
 
 def find_better_design(program: LocalProgram, conditions: Conditions, solution: Solution) -> BetterDesign | None:
-    """The design after the longest step downhill that improves the objective; None without such a step."""
+    """The design after the longest step of descent that improves the objective; None if no step improves it."""
     problem, order = program.problem, 2 if curvature_sign(conditions.curvature) < 0 else 1
     reference = solution.abscissa if minimizes_abscissa(problem) else solution.value
-    for x in _downhill_points(program, conditions, both_sides=order == 2):
-        at = dict(zip(program.variables, x.tolist(), strict=True))
-        design = design_of(problem, [at.get(n, 0.0) for n in problem.free])
-        design |= {n: solution.parameters[n] for n in problem.free if n not in at}
+    for x in _list_descent_points(program, conditions, has_both_signs=order == 2):
+        values = dict(zip(program.variables, x.tolist(), strict=True))
+        design = design_of(problem, [values.get(n, 0.0) for n in problem.free])
+        design |= {n: solution.parameters[n] for n in problem.free if n not in values}
         checked = recheck(problem, parameters := problem.ordered(design))
-        # the stored doubles must also be better
+        # the design must be better also with its parameters in double precision
         value = max(checked.objective, checked.abscissa_realised) if minimizes_abscissa(problem) else checked.objective
         if not checked.violations and problem.sign * (reference - value) > _MIN_IMPROVEMENT * (1 + abs(reference)):
             return BetterDesign(Table(parameters), value, order)
     return None
 
 
-def _downhill_points(program: LocalProgram, conditions: Conditions, both_sides: bool) -> Iterator[Array]:
+def _list_descent_points(program: LocalProgram, conditions: Conditions, has_both_signs: bool) -> Iterator[Array]:
     """Points along the direction of descent; the farthest point comes first."""
     jacobian = program.evaluate(program.x)[2]
-    signed = np.array([row.signed for row in program.rows])
-    direction = conditions.downhill / np.abs(conditions.downhill / program.sizes).max()
-    for k in range(_STEPS):
-        for side in (1.0, -1.0) if both_sides else (1.0,):
-            step = _LONGEST_STEP / _STEP_RATIO**k * side * direction
-            target = np.where(signed, np.maximum(jacobian @ step, 0.0), 0.0)
+    is_inequality = np.array([row.is_inequality for row in program.rows])
+    direction = conditions.descent_direction / np.abs(conditions.descent_direction / program.sizes).max()
+    for k in range(_STEP_COUNT):
+        for sign in (1.0, -1.0) if has_both_signs else (1.0,):
+            step = _LONGEST_STEP / _STEP_RATIO**k * sign * direction
+            target = np.where(is_inequality, np.maximum(jacobian @ step, 0.0), 0.0)
             x = _restore_rows(program, program.x + step, target)
             if x is not None:
                 yield x
@@ -71,7 +71,7 @@ def _downhill_points(program: LocalProgram, conditions: Conditions, both_sides: 
 def _restore_rows(program: LocalProgram, x: Array, target: Array) -> Array | None:
     """The nearest point at which the active rows have the target values, by Newton's method; None if it fails."""
     start = x
-    for _ in range(_ITERATIONS):
+    for _ in range(_MAX_ITERATIONS):
         _, h, jacobian, _ = program.evaluate(x)
         if not np.all(np.isfinite(jacobian)):
             return None

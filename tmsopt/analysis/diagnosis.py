@@ -18,8 +18,8 @@ from tmsopt.roots import Root, Structure, backward_error
 from tmsopt.roots.jordan import Jordan, is_regular, jordan
 from tmsopt.search.solve import solve_if_needed
 
-_RANK = 1e-7  # largest relative singular value that counts as 0
-_DISTANCE_FACTOR = 10.0  # or this times √distance, because near a semisimple root singular values are about √distance
+_ZERO_SINGULAR_VALUE = 1e-7  # largest relative singular value that counts as 0
+_DISTANCE_FACTOR = 10.0  # the same in units of √distance, the size of such values near a semisimple root
 
 
 @dataclass(frozen=True, repr=False)
@@ -32,7 +32,8 @@ class Diagnosis(Printable):
         geometric: number of independent eigenvectors; 1 for a polynomial without matrices.
         partial: lengths of the Jordan chains, longest first; empty if the computed ranks contradict each other.
         kind: ``defective`` for one chain, ``semisimple`` for chains of length 1, ``partly defective`` otherwise.
-        jordan: the singular values behind the verdict; None without matrices.
+        jordan: the singular values from which `kind` follows; None if the model has no matrices, or matrices that are
+            singular for every s.
         distance: relative change of the coefficients from the design to the nearest polynomial with the structure.
         responses: one response for each parameter; the parameter that moves the root most comes first.
         eigenfrequency: ω = i s for a complex system, otherwise None.
@@ -96,15 +97,16 @@ def diagnose(design: ProblemSource, *, progress: Listener | None = None) -> tupl
     start_steps(progress, "splitting roots")
     problem = solution.problem.posed
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
-    values, ideal = problem.values(parameters), solution.of_polynomial
-    ideal_at_design = values["structure"]
-    assert isinstance(ideal_at_design, Structure)
-    if (
-        ideal_at_design.name != ideal.name
-    ):  # the stored doubles differ slightly from the ideal design, to satisfy a limit
-        z = np.array([complex(r.re, r.im) for r in ideal.roots for _ in range(r.multiplicity)])
-        ideal_at_design = replace(ideal, distance=float(backward_error([float(c) for c in values.coefficients], z)))
-    return diagnose_roots(problem.model, problem.parameter_set, parameters, ideal_at_design, problem.free)
+    values, structure = problem.values(parameters), solution.of_polynomial
+    structure_at_design = values["structure"]
+    assert isinstance(structure_at_design, Structure)
+    # to satisfy a limit, the stored parameters may differ slightly from those at which the roots are multiple
+    if structure_at_design.name != structure.name:
+        z = np.array([complex(r.re, r.im) for r in structure.roots for _ in range(r.multiplicity)])
+        structure_at_design = replace(
+            structure, distance=float(backward_error([float(c) for c in values.coefficients], z))
+        )
+    return diagnose_roots(problem.model, problem.parameter_set, parameters, structure_at_design, problem.free)
 
 
 def diagnose_roots(
@@ -119,14 +121,14 @@ def diagnose_roots(
     Args:
         free: ranges of free parameters. A value that is tiny compared with its range may be a rounded 0.
     """
-    widths, diagnoses = {n: b - a for n, (a, b) in (free or {}).items()}, []
+    range_widths, diagnoses = {n: b - a for n, (a, b) in (free or {}).items()}, []
 
     def find_chains(point: RootPoint) -> Jordan | None:
-        """Jordan structure by ranks of the matrices; None without matrices, or if they are singular for every s."""
+        """The Jordan chains, by ranks of the matrices; None without matrices, or if they are singular for every s."""
         if model.pencil is None:
             return None
         matrices = evaluate_pencil(model, parameter_set, point.values)
-        threshold = max(_RANK, _DISTANCE_FACTOR * math.sqrt(structure.distance))
+        threshold = max(_ZERO_SINGULAR_VALUE, _DISTANCE_FACTOR * math.sqrt(structure.distance))
         if not is_regular(matrices, point.s, threshold):
             return None
         return jordan(matrices, point.s, point.multiplicity, threshold)
@@ -136,24 +138,30 @@ def diagnose_roots(
             k = root.multiplicity
             if k == 1 or (root.im < 0 and model.double is None):
                 continue
-            stored = refine_root(model, parameter_set, design, widths, complex(root.re, root.im), k)
-            as_stored = find_chains(stored)
-            point = refine_point(stored, as_stored.geometric if as_stored else 1)
-            exact, g = find_chains(point), point.geometric
-            verdict = exact if as_stored and exact and exact.geometric == as_stored.geometric else as_stored
-            partial = verdict.partial if verdict else (k,)
+            stored_point = refine_root(model, parameter_set, design, range_widths, complex(root.re, root.im), k)
+            stored_chains = find_chains(stored_point)
+            point = refine_point(stored_point, stored_chains.geometric if stored_chains else 1)
+            refined_chains, g = find_chains(point), point.geometric
+            chains = (
+                refined_chains
+                if stored_chains and refined_chains and refined_chains.geometric == stored_chains.geometric
+                else stored_chains
+            )
+            partial = chains.partial if chains else (k,)
             kind = "semisimple" if g == k else "defective" if g == 1 else "partly defective"
-            ordered = tuple(sorted((compute_response(point, name) for name in parameter_set.names), key=_rank_response))
+            responses = tuple(
+                sorted((compute_response(point, name) for name in parameter_set.names), key=_rank_response)
+            )
             s = midpoint(point.s)
             omega = (complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, k)]))
             distance = structure.distance
-            diagnoses.append(Diagnosis(s.real, s.imag, k, g, partial, kind, verdict, distance, ordered, *omega))
+            diagnoses.append(Diagnosis(s.real, s.imag, k, g, partial, kind, chains, distance, responses, *omega))
     return tuple(diagnoses)
 
 
-def _rank_response(answer: Response) -> tuple[float, float]:
-    first = answer.laws[0].branches if answer.laws else None
-    return (float(first.exponent), -first.size) if first else (math.inf, 0.0)
+def _rank_response(response: Response) -> tuple[float, float]:
+    fastest = response.laws[0].branches if response.laws else None
+    return (float(fastest.exponent), -fastest.size) if fastest else (math.inf, 0.0)
 
 
 def _law_to_json(law: Law) -> dict[str, Any]:

@@ -26,7 +26,7 @@ class Explanation(Tabular):
         levers: the active limits, the most valuable first; empty unless the design is optimal.
         rounding: free parameter → the design with only this parameter rounded, to 3 digits.
         precision: the design with all free parameters rounded to 2, 3, 4 and 6 digits.
-        goal: the objective or the located pattern; empty without one.
+        goal: the objective or the located pattern; empty if the problem has neither.
         abscissa, value: abscissa of the design, and value of its objective.
         warnings: arbitrary active bounds, bounds that are reached without a gain, parameters without effect.
 
@@ -80,7 +80,7 @@ def explain(design: ProblemSource, *, resolve: bool = True, progress: Listener |
     More: docs/how_to/report.md
     """
     solution = solve_if_needed(design, progress)
-    steps = start_steps(progress, "moving limits" if resolve else "weighing limits", "limit")
+    steps = start_steps(progress, "moving limits" if resolve else "computing multipliers", "limit")
     problem = solution.problem.posed
     rounded_alone, rounded_together = (
         list_rounded_designs(solution) if not solution.violations else (Table[RoundedDesign](), ())

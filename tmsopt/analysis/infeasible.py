@@ -13,7 +13,8 @@ from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import dimension_of, limit_text
 from tmsopt.records import Table
 
-_WRITTEN_DIGITS = 12  # digits of a present limit; the new limit next to it may differ in the sixth digit
+_WRITTEN_DIGITS = 12  # digits of a present limit, since the new limit may differ from it in the sixth digit
+# conditions that are no limits of the problem → their description
 _OTHER_CONDITIONS = {
     "a0": "a mass matrix that is not singular (a0 = 0)",
     "coefficients": "coefficients that have values",
@@ -36,8 +37,8 @@ def infeasible_sentences(solution: Solution, full: bool = False) -> list[str]:
         return lines
     names = relaxation.conflict or tuple(relaxation.amounts)
     if len(names) > 1:
-        proved = relaxation.irreducible and _is_proved_infeasible(solution, names)
-        words = "in conflict" if proved else "in conflict, not proved"
+        is_proved = relaxation.irreducible and _is_proved_infeasible(solution, names)
+        words = "in conflict" if is_proved else "in conflict, not proved"
         lines.append(f"{words}: {', '.join(_describe_limit(problem, n) for n in names)}")
     changes = [
         " and ".join(_describe_change(problem, *limit) for limit in remedy.items()) for remedy in relaxation.remedies
@@ -49,8 +50,8 @@ def infeasible_sentences(solution: Solution, full: bool = False) -> list[str]:
 
 def _describe_obstacle(solution: Solution) -> str:
     problem, relaxation = solution.problem.posed, solution.relaxation
-    roots_alone = relaxation is None or not set(relaxation.conflict) - set(problem.asked_of_roots)
-    if solution.need and (solution.need.found or (_is_unstable(solution) and roots_alone)):
+    only_roots_conflict = relaxation is None or not set(relaxation.conflict) - set(problem.asked_of_roots)
+    if solution.need and (solution.need.found or (_is_unstable(solution) and only_roots_conflict)):
         return _describe_required_speed(solution, solution.need)
     if solution.status != "infeasible":
         return ""
@@ -87,8 +88,10 @@ def _is_proved_infeasible(solution: Solution, names: Collection[str]) -> bool:
     """
     problem = solution.problem.posed
     constraints = {name: text for name, text in problem.constraints.items() if name in names}
-    has_all = constraints.keys() == problem.constraints.keys()
-    return solution.bound.proven and (has_all or bound_without_search(problem.derive(constraints=constraints)).proven)
+    has_all_limits = constraints.keys() == problem.constraints.keys()
+    return solution.bound.proven and (
+        has_all_limits or bound_without_search(problem.derive(constraints=constraints)).proven
+    )
 
 
 def _describe_required_speed(solution: Solution, need: RequiredValue) -> str:
@@ -100,16 +103,19 @@ def _describe_required_speed(solution: Solution, need: RequiredValue) -> str:
     subject = "no stable design"
     if not is_unstable:
         subject = f"no design with {_join_words([_describe_limit(problem, n) for n in limits])}"
-    proved = solution.status == "infeasible" and solution.bound.proven
-    exists = "exists" if proved or (is_unstable and solution.any_stable is False) else "was found"
+    is_proved = solution.status == "infeasible" and solution.bound.proven
+    verb = "exists" if is_proved or (is_unstable and solution.any_stable is False) else "was found"
     low, high = problem.free.get(name, (problem.fixed.get(name, math.nan),) * 2)
-    at = f"at {name} = {unit.show(low)}" if low == high else f"for {name} from {unit.number(low)} to {unit.show(high)}"
+    place_text = (
+        f"at {name} = {unit.show(low)}" if low == high else f"for {name} from {unit.number(low)} to {unit.show(high)}"
+    )
     if not need.found:
         low, high = need.looked
-        return f"{subject} {exists} {at}; none was found for {name} from {unit.number(low)} to {unit.show(high)} either"
+        searched_range = f"{name} from {unit.number(low)} to {unit.show(high)}"
+        return f"{subject} {verb} {place_text}; none was found for {searched_range} either"
     extreme, value = "highest" if need.most else "lowest", unit.show(need.shown)
     design = "a stable design that satisfies all other limits" if is_unstable else "a design that satisfies all limits"
-    return f"{subject} {exists} {at}; the {extreme} {name} found for {design} is {value}"
+    return f"{subject} {verb} {place_text}; the {extreme} {name} found for {design} is {value}"
 
 
 def _is_unstable(solution: Solution) -> bool:
@@ -119,9 +125,9 @@ def _is_unstable(solution: Solution) -> bool:
 def _describe_requirement(problem: Posed, bound: str, required: str) -> str:
     """The value that a parameter needs, and the end of its range that does not allow it."""
     name, is_upper, value = split_bound(problem, bound)
-    word, opposite = ("at least", "at most") if is_upper else ("at most", "at least")
+    word, opposite_word = ("at least", "at most") if is_upper else ("at most", "at least")
     allowed = unit_of(problem, bound).show(value, _WRITTEN_DIGITS)
-    return f"{name} {word} {required} ({opposite} {allowed} is allowed)"
+    return f"{name} {word} {required} ({opposite_word} {allowed} is allowed)"
 
 
 def _describe_nearest(solution: Solution, name: str) -> str:
@@ -133,15 +139,17 @@ def _describe_nearest(solution: Solution, name: str) -> str:
     sides = SIGN.split(problem.constraints[name])
     side_values = condition.sides(problem.values(relaxation.parameters))
     amount = relaxation.amounts.get(name, 0.0)
-    for side, opposite, side_value, sign in zip(sides, reversed(sides), side_values, (1, -1), strict=True):
-        if (limit := _parse_number(opposite)) is not None:
-            varied = problem.nominal is not problem
+    for side, opposite_side, side_value, sign in zip(sides, reversed(sides), side_values, (1, -1), strict=True):
+        if (limit := _parse_number(opposite_side)) is not None:
+            has_cases = problem.nominal is not problem
             # the values of one design do not include the robustness radius or the worst of several cases
-            value = side_value if math.isfinite(side_value) and not varied else limit + sign * condition.sign * amount
+            value = (
+                side_value if math.isfinite(side_value) and not has_cases else limit + sign * condition.sign * amount
+            )
             if not math.isfinite(value) or not math.isfinite(amount):
                 return f": {side.strip()} has no value where the search ended"
             text = f"{side.strip()} = {unit_of(problem, name).show(value)}"
-            return f": the nearest design found has {text}{' in its worst case' if varied else ''}"
+            return f": the nearest design found has {text}{' in its worst case' if has_cases else ''}"
     return ""
 
 
@@ -149,11 +157,11 @@ def _describe_change(problem: Posed, name: str, new_limit: str) -> str:
     """The new limit that the user should write, and the present number."""
     if _is_range_end(problem, name):
         parameter, is_upper, value = split_bound(problem, name)
-        old = unit_of(problem, name).number(value, _WRITTEN_DIGITS)
-        return f"{parameter} {'up' if is_upper else 'down'} to {new_limit} instead of {old}"
+        old_text = unit_of(problem, name).number(value, _WRITTEN_DIGITS)
+        return f"{parameter} {'up' if is_upper else 'down'} to {new_limit} instead of {old_text}"
     limit = limit_value(problem.constraints[name])
-    old = "" if limit is None else f" instead of {limit:.{_WRITTEN_DIGITS}g}"
-    return f"{new_limit}{old} ({_name_with_unit(problem, name)})"
+    old_text = "" if limit is None else f" instead of {limit:.{_WRITTEN_DIGITS}g}"
+    return f"{new_limit}{old_text} ({_name_with_unit(problem, name)})"
 
 
 def _name_with_unit(problem: Posed, name: str) -> str:

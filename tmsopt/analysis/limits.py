@@ -20,11 +20,11 @@ from tmsopt.progress import Counts
 from tmsopt.records import plain
 from tmsopt.search.solve import solve_any_status
 
-DIFFERS = 0.2
+_MAX_DIFFERENCE = 0.2
 """Relative difference between predicted and resolved gain above which the report gives a reason."""
 
-_RETRY_STARTS = 8  # starts of the second search, if the first search, from the optimum only, gives a different gain
-_NOISE = 1e-8  # largest difference, relative to the objective, that is not significant
+_RETRY_STARTS = 8  # starts of the second search, after a first search from the optimum that gives a different gain
+_NOISE = 1e-8  # largest difference of two objectives, relative to 1 + |objective|, that is not significant
 
 
 @dataclass(frozen=True)
@@ -99,9 +99,9 @@ def find_levers(solution: Solution, resolve: bool = True, progress: Counts | Non
     if solution.status != "optimal":
         return ()
     levers = [_first_order_lever(solution, name) for name in solution.active]
-    sample = resolve and (len(levers) == 1 or _has_remote_optimum(solution, levers))
+    with_sample = resolve and (len(levers) == 1 or _has_remote_optimum(solution, levers))
     for k, lever in enumerate(levers):
-        levers[k] = _resolve_lever(solution, lever, sample) if resolve and lever.step else lever
+        levers[k] = _resolve_lever(solution, lever, with_sample) if resolve and lever.step else lever
         if progress:
             progress(k + 1, len(levers))
     return tuple(sorted(levers, key=lambda v: -(v.resolved if math.isfinite(v.resolved) else v.predicted)))
@@ -144,58 +144,62 @@ def _first_order_lever(solution: Solution, name: str) -> Lever:
     if name in problem.constraints:
         condition, limit_shown = problem.conditions[name], limit_text(problem, name)
         sides = [abs(float(side)) for side in condition.sides(problem.values(solution.parameters))]
-        size = max(filter(math.isfinite, sides), default=1.0)  # equal within rounding
-        natural = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, size)
-        sign, words = condition.sign, f"relaxing {name} ({limit_shown}) by {natural.text}"
+        size = max(filter(math.isfinite, sides), default=1.0)  # the sides are equal within rounding
+        constraint_step = natural_step(unit_of(problem, name), dimension_of(problem, name).unit, size)
+        sign, move = condition.sign, f"relaxing {name} ({limit_shown}) by {constraint_step.text}"
         if condition.equality:  # the right-hand side moves in the direction that improves the objective
             sign = math.copysign(1.0, -problem.sign * multiplier)
-            words = f"moving {name} ({limit_shown}) by {'' if sign > 0 else '-'}{natural.text}"
-        return Lever(name, "constraint", limit_shown, False, words, sign * natural.size, abs(multiplier), gained=gained)
+            move = f"moving {name} ({limit_shown}) by {'' if sign > 0 else '-'}{constraint_step.text}"
+        return Lever(
+            name, "constraint", limit_shown, False, move, sign * constraint_step.size, abs(multiplier), gained=gained
+        )
     parameter_name, is_upper, limit = split_bound(problem, name)
     parameter, width = problem.parameter_set[parameter_name], float(np.ptp(problem.free[parameter_name]))
     # the size of an angle is the width of its range, because a tilt of 0 is not special
     size = width if parameter.unit == "rad" or not limit else min(abs(limit), width)
     unit, direction = unit_of(problem, parameter_name), 1.0 if is_upper else -1.0
     step = step_within(unit, parameter.unit, size, limit, direction, parameter.range)
-    words = f"{'raising' if is_upper else 'lowering'} {name} by {step.text}" if step else ""
-    change, limit_shown = direction * step.size if step else 0.0, unit.show(limit, 10)
-    return Lever(name, "bound", limit_shown, is_physical(problem, name), words, change, abs(multiplier), gained=gained)
+    move = f"{'raising' if is_upper else 'lowering'} {name} by {step.text}" if step else ""
+    signed_step, limit_shown = direction * step.size if step else 0.0, unit.show(limit, 10)
+    return Lever(
+        name, "bound", limit_shown, is_physical(problem, name), move, signed_step, abs(multiplier), gained=gained
+    )
 
 
-def _solve_moved(solution: Solution, problem: Posed, starts: int, sample: bool) -> Solution:
-    """Solve a problem with moved limits, starting at the optimum; with `sample`, also search the whole box."""
+def _solve_moved(solution: Solution, problem: Posed, starts: int, with_sample: bool) -> Solution:
+    """Solve a problem with moved limits, starting at the optimum; if `with_sample`, also search the whole box."""
     options = replace(DEFAULTS, starts=starts, near={n: solution.parameters[n] for n in problem.free})
-    return solve_any_status(problem, options, without_sample=not sample, with_bound=False)
+    return solve_any_status(problem, options, without_sample=not with_sample, with_bound=False)
 
 
 def _has_remote_optimum(solution: Solution, levers: Sequence[Lever]) -> bool:
-    """Whether, with all limits moved, a design elsewhere is better than the optimum near the present one."""
+    """Whether, after all limits are moved, a search of the box finds a better design than a search from the optimum."""
     problem = solution.problem.posed
     for lever in levers:
         with suppress(InputError):
             problem = move_limit(problem, lever.name, lever.step)
-    near_solution, box_solution = (_solve_moved(solution, problem, 1, sample) for sample in (False, True))
+    near_solution, box_solution = (_solve_moved(solution, problem, 1, with_sample) for with_sample in (False, True))
     return near_solution.status != "optimal" or problem.sign * (near_solution.value - box_solution.value) > _NOISE * (
         1 + abs(solution.value)
     )
 
 
-def _resolve_lever(solution: Solution, lever: Lever, sample: bool) -> Lever:
-    """The lever with the gain found by solving again from the optimum."""
+def _resolve_lever(solution: Solution, lever: Lever, with_sample: bool) -> Lever:
+    """The lever with the gain that is found by moving its limit and solving again from the optimum."""
     try:
         problem = move_limit(solution.problem.posed, lever.name, lever.step)
     except InputError:
         return replace(lever, reason="the problem with this limit moved is not valid")
     best_solution = None
     for starts in (1, _RETRY_STARTS):
-        new_solution = _solve_moved(solution, problem, starts, sample or starts > 1)
+        new_solution = _solve_moved(solution, problem, starts, with_sample or starts > 1)
         if new_solution.status == "optimal" and not (
             best_solution and problem.sign * (new_solution.value - best_solution.value) >= 0
         ):
             best_solution = new_solution
             gain = -problem.sign * (best_solution.value - solution.value)
             lever = replace(lever, resolved=gain, structure=best_solution.structure)
-            if abs(lever.relative) <= DIFFERS:
+            if abs(lever.relative) <= _MAX_DIFFERENCE:
                 return lever
     if best_solution is None:
         return replace(lever, reason=f"the problem with this limit moved is {new_solution.status.replace('_', ' ')}")

@@ -1,4 +1,4 @@
-"""Judges the local optimality of a design by the multipliers of its factors and limits.
+"""Decides whether a design is a local optimum, by the multipliers of its factors and limits.
 
 The program minimises γ subject to p(t + γ; θ) = a0(θ) ∏ (t² + βᵢ t + κᵢ), βᵢ, κᵢ ≥ 0, and to the limits on θ. The
 factors of the roots on the rightmost line are at their bounds (see `tmsopt.analysis.program`). The conditions are
@@ -87,7 +87,7 @@ class Optimality(Printable):
         residual: share of the gradient that the multipliers do not explain.
         curvature: smallest curvature in the null space of the conditions, relative to the largest; nan at a vertex.
         idle: free parameters without an effect.
-        better: a better design nearby, rechecked, if the verdict is ``not minimal``.
+        better: a better design nearby, which was rechecked, if the verdict is ``not minimal``.
         better_value: objective of the better design.
 
     Example:
@@ -121,9 +121,9 @@ class Optimality(Printable):
 
 
 def optimality(design: ProblemSource, *, progress: Listener | None = None) -> Optimality:
-    """Judge a design by the first-order and, if needed, second-order conditions on its factors.
+    """Decide whether a design is a local optimum, by first- and, if needed, second-order conditions on its factors.
 
-    If a pattern was located without an objective, the abscissa is judged, within the ranges and constraints.
+    If a pattern was located without an objective, the objective is the abscissa, within the ranges and constraints.
 
     Args:
         design: a solution, or a problem or its file, which is solved first.
@@ -136,39 +136,39 @@ def optimality(design: ProblemSource, *, progress: Listener | None = None) -> Op
     More: docs/how_to/report.md
     """
     solution = solve_if_needed(design, progress)
-    start_steps(progress, "judging the optimum")
+    start_steps(progress, "checking the optimum")
     try:
         problem = _choose_problem(solution)
         program = build_program(problem, solution)
     except NotCovered as error:
         return Optimality(NOT_COVERED, str(error))
     conditions = evaluate_conditions(program)
-    weight = sum(y for y, h in zip(conditions.scaled, program.rows, strict=True) if h.name == "c1")
-    if not conditions.downhill.any() and not weight > POSITIVE:
+    weight = sum(y for y, h in zip(conditions.scaled_multipliers, program.rows, strict=True) if h.name == "c1")
+    if not conditions.descent_direction.any() and not weight > POSITIVE:
         return Optimality(NOT_COVERED, "the objective does not decrease with the abscissa")
-    better = find_better_design(program, conditions, solution) if conditions.downhill.any() else None
-    verdict, order, reason = _judge(solution, program, conditions, better)
-    stationary = conditions.residual <= STATIONARY
-    unknowns, count = _count_unknowns(program)
+    better_design = find_better_design(program, conditions, solution) if conditions.descent_direction.any() else None
+    verdict, order, reason = _decide_verdict(solution, program, conditions, better_design)
+    is_stationary = conditions.residual <= STATIONARY
+    unknown_count, condition_count = _count_unknowns(program)
     return Optimality(
         verdict=verdict,
         reason=reason,
         order=order,
         goal=problem.goal,
-        roots=_list_rightmost_roots(program, conditions) if stationary else (),
-        limits=Table(_compute_limit_gains(solution, program, conditions) if stationary else {}),
-        unknowns=unknowns,
-        conditions=count,
+        roots=_list_rightmost_roots(program, conditions) if is_stationary else (),
+        limits=Table(_compute_limit_gains(solution, program, conditions) if is_stationary else {}),
+        unknowns=unknown_count,
+        conditions=condition_count,
         residual=conditions.residual,
         curvature=conditions.curvature,
         idle=program.idle,
-        better=better.parameters if better else Table(),
-        better_value=better.value if better else math.nan,
+        better=better_design.parameters if better_design else Table(),
+        better_value=better_design.value if better_design else math.nan,
     )
 
 
 def _choose_problem(solution: Solution) -> Posed:
-    """The problem of which the design may be an optimum.
+    """The problem whose local optimum the design may be.
 
     Raises:
         NotCovered: if there is no such problem; the text is the reason.
@@ -204,32 +204,33 @@ def _choose_problem(solution: Solution) -> Posed:
     return problem
 
 
-def _judge(
-    solution: Solution, program: LocalProgram, conditions: Conditions, better: BetterDesign | None
+def _decide_verdict(
+    solution: Solution, program: LocalProgram, conditions: Conditions, better_design: BetterDesign | None
 ) -> tuple[str, int, str]:
     """The verdict, the order of the derivatives that decide it, and the verdict in a sentence."""
     problem, name = program.problem, f"this {solution.structure} is"
     extreme = f"local {'maximum' if problem.sense == 'maximize' else 'minimum'} of {problem.goal}"
     extreme += ", though this was not asked for" if solution.problem.locate else ""
-    if better is not None:
-        reason = f"{_describe_descent(program, conditions)}; {_describe_better_design(solution, better)}"
-        return NOT_MINIMAL, better.order, f"{name} no {extreme}: {reason}"
-    if doubt := _find_doubt(program, conditions):
-        return UNDECIDED, 0, f"undecided whether {name} a {extreme}: {doubt}"
-    unknowns, count = _count_unknowns(program)
-    active = f"{count} active condition{'s leave' if count != 1 else ' leaves'}"
-    idle = f"; without effect: {', '.join(program.idle)}" if program.idle else ""
+    if better_design is not None:
+        reason = f"{_describe_descent(program, conditions)}; {_describe_better_design(solution, better_design)}"
+        return NOT_MINIMAL, better_design.order, f"{name} no {extreme}: {reason}"
+    if undecided_reason := _explain_undecided(program, conditions):
+        return UNDECIDED, 0, f"undecided whether {name} a {extreme}: {undecided_reason}"
+    unknown_count, condition_count = _count_unknowns(program)
+    active_text = f"{condition_count} active condition{'s leave' if condition_count != 1 else ' leaves'}"
+    idle_text = f"; without effect: {', '.join(program.idle)}" if program.idle else ""
     if np.isnan(conditions.curvature):
-        return STRICT, 1, f"{name} a strict {extreme}: {active} none of the {unknowns} unknowns free{idle}"
-    bend = "downwards" if solution.problem.posed.sense == "maximize" else "upwards"
-    free = f"{count} active condition{'s' * (count != 1)} for {unknowns} unknowns"
-    curved = f"in every direction that these leave free the objective curves {bend}"
-    return STRICT, 2, f"{name} a strict {extreme}: {free}, and {curved}{idle}"
+        reason = f"{active_text} none of the {unknown_count} unknowns free{idle_text}"
+        return STRICT, 1, f"{name} a strict {extreme}: {reason}"
+    direction = "downwards" if solution.problem.posed.sense == "maximize" else "upwards"
+    conditions_text = f"{condition_count} active condition{'s' * (condition_count != 1)} for {unknown_count} unknowns"
+    curvature_text = f"in every direction that these leave free the objective curves {direction}"
+    return STRICT, 2, f"{name} a strict {extreme}: {conditions_text}, and {curvature_text}{idle_text}"
 
 
-def _find_doubt(program: LocalProgram, conditions: Conditions) -> str:
+def _explain_undecided(program: LocalProgram, conditions: Conditions) -> str:
     """Why the conditions do not decide, although no better design was found; empty if they decide."""
-    if conditions.residual > STATIONARY or (conditions.downhill.any() and np.isnan(conditions.curvature)):
+    if conditions.residual > STATIONARY or (conditions.descent_direction.any() and np.isnan(conditions.curvature)):
         return f"{_describe_residual(conditions)}, but no better design was found downhill"
     deviations, sizes = np.abs(program.evaluate(program.x)[1]), np.array([h.size for h in program.rows])
     worst_deviation = float(
@@ -237,8 +238,10 @@ def _find_doubt(program: LocalProgram, conditions: Conditions) -> str:
     )
     if worst_deviation > _TOLERANCE:
         return f"the active conditions hold only to {worst_deviation:.1g}"
-    loose_rows = [h for h, firm in zip(program.rows, conditions.firm, strict=True) if h.name == "c2" and not firm]
-    if any(program.line[h.cluster].multiplicity > 3 for h in loose_rows):
+    loose_rows = [
+        h for h, is_firm in zip(program.rows, conditions.is_firm, strict=True) if h.name == "c2" and not is_firm
+    ]
+    if any(program.rightmost_roots[h.root_index].multiplicity > 3 for h in loose_rows):
         return "no first-order condition keeps a multiple root together"  # c₄ ≤ c₂² may then outweigh c₂
     if curvature_sign(conditions.curvature) <= 0 and not np.isnan(conditions.curvature):
         change = "improves" if curvature_sign(conditions.curvature) else "is flat"
@@ -251,59 +254,65 @@ def _describe_residual(conditions: Conditions) -> str:
 
 
 def _count_unknowns(program: LocalProgram) -> tuple[int, int]:
-    """Number of unknowns: parameters with an effect and the abscissa. Number of active rows that restrict them."""
-    unknowns = sum(name in program.problem.free for name in program.variables) + 1
-    return unknowns, len(program.rows) - (len(program.x) - unknowns)
+    """Number of unknowns (parameters with an effect, and the abscissa); number of active rows that restrict them."""
+    unknown_count = sum(name in program.problem.free for name in program.variables) + 1
+    return unknown_count, len(program.rows) - (len(program.x) - unknown_count)
 
 
 def _describe_descent(program: LocalProgram, conditions: Conditions) -> str:
     """How the objective improves: to first order, or by its curvature."""
     if curvature_sign(conditions.curvature) < 0:
         return "it is stationary, but second derivatives let it improve along the active conditions"
-    if not conditions.independent or conditions.residual > STATIONARY:
+    if not conditions.is_independent or conditions.residual > STATIONARY:
         return _describe_residual(conditions)
-    ways = {"c1": "roots move left of the others", "c2": "a multiple root splits"}
-    scaled_rows = zip(program.rows, conditions.scaled, strict=True)
+    words_by_coefficient = {"c1": "roots move left of the others", "c2": "a multiple root splits"}
+    scaled_rows = zip(program.rows, conditions.scaled_multipliers, strict=True)
     improvements = [
-        ways.get(h.name, f"the design moves away from {h.name}") for h, y in scaled_rows if h.signed and y < -POSITIVE
+        words_by_coefficient.get(h.name, f"the design moves away from {h.name}")
+        for h, y in scaled_rows
+        if h.is_inequality and y < -POSITIVE
     ]
     return f"it improves if {' and if '.join(dict.fromkeys(improvements))}"
 
 
-def _describe_better_design(solution: Solution, better: BetterDesign) -> str:
+def _describe_better_design(solution: Solution, better_design: BetterDesign) -> str:
     """The parameters that change, and the better objective."""
-    now, then = solution.parameters, better.parameters
-    parts = [f"{n} {then[n]:.6g}" for n in solution.problem.free if abs(then[n] - now[n]) > 1e-9 * abs(now[n])]
-    return f"{', '.join(parts)} gives {better.value:.6g}"
+    old, new = solution.parameters, better_design.parameters
+    parts = [f"{n} {new[n]:.6g}" for n in solution.problem.free if abs(new[n] - old[n]) > 1e-9 * abs(old[n])]
+    return f"{', '.join(parts)} gives {better_design.value:.6g}"
 
 
 def _list_rightmost_roots(program: LocalProgram, conditions: Conditions) -> tuple[RightmostRoot, ...]:
     """The roots on the rightmost line with their multipliers."""
     rightmost_roots, rows = [], list(zip(program.rows, conditions.multipliers.tolist(), strict=True))
     model = program.problem.model
-    total = sum(program.line[h.cluster].multiplicity * y for h, y in rows if h.name == "c1")
-    for k, root in enumerate(program.line):
-        multipliers = {h.name: y for h, y in rows if h.cluster == k}
-        first, second = multipliers.pop("c1"), multipliers.pop("c2", math.nan)
-        share = root.multiplicity * first / total if total else math.nan
-        beta = first / 2 if root.im else first  # β moves both roots of a pair by β/2
+    total_multiplier = sum(
+        program.rightmost_roots[row.root_index].multiplicity * multiplier
+        for row, multiplier in rows
+        if row.name == "c1"
+    )
+    for k, root in enumerate(program.rightmost_roots):
+        multipliers = {row.name: multiplier for row, multiplier in rows if row.root_index == k}
+        c1, c2 = multipliers.pop("c1"), multipliers.pop("c2", math.nan)
+        share = root.multiplicity * c1 / total_multiplier if total_multiplier else math.nan
+        beta = c1 / 2 if root.im else c1  # β moves both roots of a pair by β/2
         # the user's root of a complex system is the conjugate
         (user_root,) = user_roots(model, [root if model.carrier is None else replace(root, im=-root.im)])
         omega = (complex(w.re, w.im) for w in eigenfrequencies(model, [user_root]))
         ties = tuple(multipliers.values())
         rightmost_roots.append(
-            RightmostRoot(user_root.re, user_root.im, root.multiplicity, share, beta, second, ties, *omega)
+            RightmostRoot(user_root.re, user_root.im, root.multiplicity, share, beta, c2, ties, *omega)
         )
     return tuple(rightmost_roots)
 
 
 def _compute_limit_gains(solution: Solution, program: LocalProgram, conditions: Conditions) -> Mapping[str, float]:
     """Gain of the objective per unit of relaxation; for an equality, per unit that is added to the right-hand side."""
-    problem, limits = program.problem, dict[str, float]()
-    for h, y, firm in zip(program.rows, conditions.multipliers.tolist(), conditions.firm, strict=True):
+    problem, gains = program.problem, dict[str, float]()
+    for h, y, is_firm in zip(program.rows, conditions.multipliers.tolist(), conditions.is_firm, strict=True):
         if h.name in problem.constraints:
-            limits[h.name] = y if h.signed else problem.sign * y
-        elif h.signed and h.cluster < 0 and firm and (name := h.name.rsplit(".", 1)[0]) in problem.free:
-            tilt = problem.parameter_set[name].tangent
-            limits[h.name] = y * (1 + math.tan(solution.parameters[name]) ** 2 if tilt else 1.0)
-    return limits
+            gains[h.name] = y if h.is_inequality else problem.sign * y
+        elif h.is_inequality and h.root_index < 0 and is_firm and (name := h.name.rsplit(".", 1)[0]) in problem.free:
+            is_tangent = problem.parameter_set[name].tangent
+            gains[h.name] = y * (1 + math.tan(solution.parameters[name]) ** 2 if is_tangent else 1.0)
+    return gains

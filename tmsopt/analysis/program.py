@@ -35,7 +35,7 @@ from tmsopt.roots import Root, product, shift
 _MAX_SLACK = 2e-9  # largest slack of an active constraint, relative to 1 + |limit|; twice the feasibility tolerance
 _BOUND_DISTANCE = 1e-12  # largest distance of an active bound, relative to its size and the width of its range
 _SAME_LINE = 1e-6  # largest relative difference of the real parts of roots on one line, for an exact structure
-_ROOT_ROWS = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY)  # rows of factors, which this program replaces
+_REPLACED_ROWS = ("abscissa", "damping_ratio", ANGULAR_FREQUENCY)  # rows that the factors of this program replace
 
 
 class NotCovered(ValueError):
@@ -48,14 +48,14 @@ class ActiveRow:
 
     Attributes:
         name: a constraint, a bound, ``roots`` for an equation of the factors, or ``c1 …`` for a coefficient.
-        signed: whether the expression may become positive; otherwise it stays 0.
-        cluster: index of the root on the line whose factor the row belongs to; −1 for other rows.
+        is_inequality: whether the expression may become positive; otherwise it stays 0.
+        root_index: index of the root on the line whose factor the row belongs to; −1 for other rows.
         size: natural size of the expression.
     """
 
     name: str
-    signed: bool
-    cluster: int = -1
+    is_inequality: bool
+    root_index: int = -1
     size: float = 1.0
 
 
@@ -70,7 +70,7 @@ class LocalProgram:
         sizes: natural size of each variable.
         rows: one for each component of h.
         functions: (x, y) → ∇f, h, ∂h/∂x and the Hessian of f − y·h.
-        line: the roots on the rightmost line, and the upper root of each complex pair on it.
+        rightmost_roots: the real roots on the rightmost line, and the upper root of each complex pair on it.
         idle: free parameters without an effect.
     """
 
@@ -80,7 +80,7 @@ class LocalProgram:
     sizes: Array
     rows: tuple[ActiveRow, ...]
     functions: ca.Function = field(repr=False)
-    line: tuple[Root, ...]
+    rightmost_roots: tuple[Root, ...]
     idle: tuple[str, ...]
 
     def evaluate(self, x: Array, y: Array | None = None) -> tuple[Array, Array, Array, Array]:
@@ -99,57 +99,60 @@ def build_program(problem: Posed, solution: Solution) -> LocalProgram:
     nlp, values, free = formulate_by_factors(problem), problem.values(solution.parameters), problem.free
     values = values.with_known({"abscissa": solution.abscissa})
     units = {"abscissa": nlp.unit, ANGULAR_FREQUENCY: nlp.unit}
-    at = dict(zip(free, variables_of(problem, solution.parameters), strict=True))
-    for n in nlp.variables[len(free) :]:  # nan for the coefficients of factors, which are not used here
-        at[n] = float(values[n]) / units.get(n, 1.0) if n in values else np.nan
-    x = {n: ca.SX.sym(n) for n in at}
+    value_of = dict(zip(free, variables_of(problem, solution.parameters), strict=True))
+    for n in nlp.variables[len(free) :]:  # the coefficients of factors are not used here: nan
+        value_of[n] = float(values[n]) / units.get(n, 1.0) if n in values else np.nan
+    x = {n: ca.SX.sym(n) for n in value_of}
     all_variables = ca.vertcat(*x.values())
     f, g = nlp.symbolic(all_variables)
-    row_values = nlp.evaluate(np.nan_to_num([*at.values()], posinf=0.0, neginf=0.0))[1]
-    rows_of = {n: _defining_rows(nlp, n) for n in x if n in nlp.rows and n not in _ROOT_ROWS}
-    # a maximum whose constant argument is the largest one here
+    row_values = nlp.evaluate(np.nan_to_num([*value_of.values()], posinf=0.0, neginf=0.0))[1]
+    defining_rows = {n: _list_defining_rows(nlp, n) for n in x if n in nlp.rows and n not in _REPLACED_ROWS}
+    # variables that stand for a maximum whose largest argument at this design is a constant
     constant_names = [
-        n for n, rows in rows_of.items() if all(nlp.row_upper[k] > 0 and row_values[k] > _MAX_SLACK for k in rows)
+        n for n, rows in defining_rows.items() if all(nlp.row_upper[k] > 0 and row_values[k] > _MAX_SLACK for k in rows)
     ]
-    f, g = ca.substitute([f, g], [x[n] for n in constant_names], [ca.SX(at[n]) for n in constant_names])
-    build = _Builder()
+    f, g = ca.substitute([f, g], [x[n] for n in constant_names], [ca.SX(value_of[n]) for n in constant_names])
+    builder = _Builder()
     for k, name in enumerate(nlp.rows):
         if name in problem.constraints and ca.depends_on(g[k], all_variables):
-            build.add_nlp_row(nlp, k, g, row_values)
+            builder.add_nlp_row(nlp, k, g, row_values)
     needed_names = [n for n in x if n == "abscissa"]
     for _ in nlp.lifts:
-        binding = ca.vertcat(f, *build.expressions)
-        for n in [n for n in x if n not in free and n not in needed_names and ca.depends_on(binding, x[n])]:
+        active_functions = ca.vertcat(f, *builder.expressions)
+        for n in [n for n in x if n not in free and n not in needed_names and ca.depends_on(active_functions, x[n])]:
             needed_names.append(n)
-            for k in _defining_rows(nlp, n):
-                build.add_nlp_row(nlp, k, g, row_values)
-    if active := [n.replace("_", " ") for n in ("damping_ratio", ANGULAR_FREQUENCY) if n in needed_names]:
-        raise NotCovered(f"the {active[0]} is active, which the conditions on the abscissa do not cover")
-    if not (needed_names and ca.depends_on(ca.vertcat(f, *build.expressions), x["abscissa"])):
+            for k in _list_defining_rows(nlp, n):
+                builder.add_nlp_row(nlp, k, g, row_values)
+    if active_quantities := [n.replace("_", " ") for n in ("damping_ratio", ANGULAR_FREQUENCY) if n in needed_names]:
+        raise NotCovered(f"the {active_quantities[0]} is active, which the conditions on the abscissa do not cover")
+    if not (needed_names and ca.depends_on(ca.vertcat(f, *builder.expressions), x["abscissa"])):
         raise NotCovered("the abscissa is not active, so this optimum does not depend on the roots")
     roots = solution.of_polynomial.roots
     size = max(float(np.hypot(r.re, r.im)) for r in roots)
     line_width = 0.0 if solution.of_polynomial.name in ("pair", "real") else _SAME_LINE * size
     line_roots = [r for r in roots if r.re >= solution.abscissa - line_width]
-    line = tuple(r for r in line_roots if r.im >= 0)
+    rightmost_roots = tuple(r for r in line_roots if r.im >= 0)
     design = {n: ca.atan(x[n]) if problem.parameter_set[n].tangent else x[n] for n in free}
     a = problem.model.coefficients(problem.ordered(design), problem.parameter_set)
-    lead = abs(float(values.coefficients[0]))
-    build.add_factors(a, lead, size, nlp.unit * x["abscissa"], line, [r for r in roots if r not in line_roots])
-    binding = ca.vertcat(f, *build.expressions)
-    idle = tuple(n for n in free if not ca.depends_on(binding, x[n]))
+    leading_size = abs(float(values.coefficients[0]))
+    builder.add_factors(
+        a, leading_size, size, nlp.unit * x["abscissa"], rightmost_roots, [r for r in roots if r not in line_roots]
+    )
+    active_functions = ca.vertcat(f, *builder.expressions)
+    idle = tuple(n for n in free if not ca.depends_on(active_functions, x[n]))
     variables = []
     for n in (n for n in x if (n in free and n not in idle) or n in needed_names):
-        natural_size = size / nlp.unit if n == "abscissa" else max(abs(at[n]), 1e-3)
+        natural_size = size / nlp.unit if n == "abscissa" else max(abs(value_of[n]), 1e-3)
         if n in free:
             low, high = (float(np.tan(e)) if problem.parameter_set[n].tangent else e for e in free[n])
-            natural_size = max(abs(at[n]), min(high - low, 1.0), 1e-12)  # a range wider than 1 is no measure of size
-            for end, limit, side in zip(("min", "max"), free[n], (1, -1), strict=True):
+            # a range wider than 1 is no measure of size
+            natural_size = max(abs(value_of[n]), min(high - low, 1.0), 1e-12)
+            for end, limit, sign in zip(("min", "max"), free[n], (1, -1), strict=True):
                 if abs(solution.parameters[n] - limit) <= _BOUND_DISTANCE * (abs(limit) + np.ptp(free[n])):
-                    build.add_row(ActiveRow(f"{n}.{end}", True), side * (x[n] - at[n]))
-        variables.append((n, x[n], at[n], natural_size))
-    names, symbols, point, sizes = zip(*variables, *build.unknowns, strict=True)
-    z, h = ca.vertcat(*symbols), ca.vertcat(*build.expressions)
+                    builder.add_row(ActiveRow(f"{n}.{end}", True), sign * (x[n] - value_of[n]))
+        variables.append((n, x[n], value_of[n], natural_size))
+    names, symbols, point, sizes = zip(*variables, *builder.unknowns, strict=True)
+    z, h = ca.vertcat(*symbols), ca.vertcat(*builder.expressions)
     y = ca.SX.sym("y", h.numel())
     parts = [ca.gradient(f, z), h, ca.jacobian(h, z), ca.hessian(f - ca.dot(y, h), z)[0]]
     return LocalProgram(
@@ -157,17 +160,17 @@ def build_program(problem: Posed, solution: Solution) -> LocalProgram:
         variables=names,
         x=np.array(point),
         sizes=np.array(sizes),
-        rows=tuple(build.rows),
+        rows=tuple(builder.rows),
         functions=ca.Function("program", [z, y], [ca.densify(part) for part in parts]),
-        line=line,
+        rightmost_roots=rightmost_roots,
         idle=idle,
     )
 
 
-def _defining_rows(nlp: NLP, name: str) -> list[int]:
+def _list_defining_rows(nlp: NLP, name: str) -> list[int]:
     """Rows that define an added variable by the parameters, but not the row of a constant argument of a maximum."""
     rows = enumerate(zip(nlp.rows, nlp.row_lower, strict=True))
-    return [k for k, (row, lower) in rows if row == name and row not in _ROOT_ROWS and lower == 0]
+    return [k for k, (row, lower) in rows if row == name and row not in _REPLACED_ROWS and lower == 0]
 
 
 class _Builder:
@@ -185,9 +188,9 @@ class _Builder:
     def add_nlp_row(self, nlp: NLP, k: int, g: Any, row_values: Array) -> None:
         """Add a row of the NLP if it is an equality or active."""
         name, lower, upper = nlp.rows[k], nlp.row_lower[k], nlp.row_upper[k]
-        for end, side in ((lower, 1), (upper, -1)):
-            if np.isfinite(end) and (lower == upper or abs(row_values[k] - end) <= _MAX_SLACK * (1 + abs(end))):
-                self.add_row(ActiveRow(name, lower != upper), side * (g[k] - end))
+        for limit, sign in ((lower, 1), (upper, -1)):
+            if np.isfinite(limit) and (lower == upper or abs(row_values[k] - limit) <= _MAX_SLACK * (1 + abs(limit))):
+                self.add_row(ActiveRow(name, lower != upper), sign * (g[k] - limit))
                 return
 
     def add_unknown(self, name: str, value: float, size: float) -> Any:
@@ -195,19 +198,25 @@ class _Builder:
         return self.unknowns[-1][1]
 
     def add_factors(
-        self, a: Sequence[Any], lead: float, size: float, gamma: Any, line: Sequence[Root], other_roots: Sequence[Root]
+        self,
+        a: Sequence[Any],
+        leading_size: float,
+        size: float,
+        gamma: Any,
+        rightmost_roots: Sequence[Root],
+        other_roots: Sequence[Root],
     ) -> None:
         """Add the equations p(t + γ) = a0 · ∏ q · r; the roots give the values of the unknowns.
 
         Args:
-            lead: |a0|, the size of the leading coefficient.
+            leading_size: |a0|, the size of the leading coefficient.
         """
         factors = []
-        for j, root in enumerate(line):
+        for j, root in enumerate(rightmost_roots):
 
-            def add_coefficient(name: str, k: int, signed: bool, j: int = j) -> Any:
+            def add_coefficient(name: str, k: int, is_inequality: bool, j: int = j) -> Any:
                 symbol = self.add_unknown(f"{name}.{j}", 0.0, size**k)
-                self.add_row(ActiveRow(name, signed, j, size**k), symbol)
+                self.add_row(ActiveRow(name, is_inequality, j, size**k), symbol)
                 return symbol
 
             omega = self.add_unknown(f"omega.{j}", root.im, size) if root.im else 0
@@ -219,11 +228,13 @@ class _Builder:
                 )
                 re[-1] += add_coefficient(f"c{k}", k, k <= 2)
                 im[-1] += add_coefficient(f"im c{k}", k, False) if root.im and k > 1 else 0
-            pair = [x + y for x, y in zip(product(re, re), product(im, im), strict=True)]
-            factors.append(pair if root.im else re)
-        left_roots = [complex(r.re, r.im) - line[0].re for r in other_roots for _ in range(r.multiplicity)]
-        monic = np.atleast_1d(np.poly(left_roots)).real.tolist()
-        factors.append([1, *(self.add_unknown(f"r{k}", monic[k], size**k) for k in range(1, len(monic)))])
+            pair_factor = [x + y for x, y in zip(product(re, re), product(im, im), strict=True)]
+            factors.append(pair_factor if root.im else re)
+        left_roots = [complex(r.re, r.im) - rightmost_roots[0].re for r in other_roots for _ in range(r.multiplicity)]
+        left_coefficients = np.atleast_1d(np.poly(left_roots)).real.tolist()
+        factors.append(
+            [1, *(self.add_unknown(f"r{k}", left_coefficients[k], size**k) for k in range(1, len(left_coefficients)))]
+        )
         shifted, multiplied = shift(a, gamma), product(*factors)
         for k in range(1, len(shifted)):
-            self.add_row(ActiveRow("roots", False, size=lead * size**k), shifted[k] - a[0] * multiplied[k])
+            self.add_row(ActiveRow("roots", False, size=leading_size * size**k), shifted[k] - a[0] * multiplied[k])

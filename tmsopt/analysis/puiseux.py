@@ -40,8 +40,8 @@ class Branches:
         """All t for a real ε, to leading order."""
         shifts: list[complex] = []
         for constant in self.constants:
-            first = (complex(constant) * eps**self.numerator) ** (1 / self.denominator)
-            shifts += [first * np.exp(2j * np.pi * k / self.denominator) for k in range(self.denominator)]
+            one_shift = (complex(constant) * eps**self.numerator) ** (1 / self.denominator)
+            shifts += [one_shift * np.exp(2j * np.pi * k / self.denominator) for k in range(self.denominator)]
         return shifts
 
 
@@ -52,8 +52,8 @@ def find_branches(terms: Sequence[Sequence[complex]]) -> tuple[tuple[Branches, .
     move in the given orders of ε count as unmoved.
     """
     k = len(terms[0]) - 1
-    first = {j: next((m for m, row in enumerate(terms) if row[j] != 0), None) for j in range(k + 1)}
-    points = [(j, m) for j, m in first.items() if m is not None]
+    lowest_orders = {j: next((m for m, row in enumerate(terms) if row[j] != 0), None) for j in range(k + 1)}
+    points = [(j, m) for j, m in lowest_orders.items() if m is not None]
     hull: list[tuple[int, int]] = []
     for j, m in points:  # lower convex hull from left to right
         while len(hull) > 1 and _compute_slope(hull[-2], hull[-1]) >= _compute_slope(hull[-2], (j, m)):

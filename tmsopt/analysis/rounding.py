@@ -18,13 +18,13 @@ from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit, unit_of
 from tmsopt.records import Table, plain
 
-ALONE = 3
-"""Significant digits of a parameter that is the only rounded one."""
+SINGLE_DIGITS = 3
+"""Significant digits if only one parameter is rounded."""
 
 DIGITS = (2, 3, 4, 6)
 """Significant digits to which all parameters are rounded together."""
 
-_UNROUNDED = 1e-15  # largest relative change that is no rounding, for example by converting radians
+_CONVERSION_ERROR = 1e-15  # largest relative error of the conversion of a unit, such as radians to degrees
 _DEGREE = math.pi / 180
 _LARGEST_DENOMINATOR = 10**6  # largest denominator of a factor between units, such as 5/18
 _DECIMALS = 140  # decimal digits of the exact numbers
@@ -62,9 +62,9 @@ class RoundedDesign:
 def list_rounded_designs(solution: Solution) -> tuple[Table[RoundedDesign], tuple[RoundedDesign, ...]]:
     """Each free parameter rounded alone, if it has more digits, and all of them together to 2, 3, 4 and 6 digits."""
     names = list(solution.problem.free)
-    names_alone = [n for n in names if not _is_short(solution, n)]
+    names_alone = [n for n in names if not _has_few_digits(solution, n)]
     designs = round_design(
-        solution, [*(([n], ALONE) for n in names_alone), *((names, digits) for digits in DIGITS if names)]
+        solution, [*(([n], SINGLE_DIGITS) for n in names_alone), *((names, digits) for digits in DIGITS if names)]
     )
     return Table(dict(zip(names_alone, designs, strict=False))), designs[len(names_alone) :]
 
@@ -85,7 +85,7 @@ def round_design(solution: Solution, choices: Sequence[tuple[Sequence[str], int]
                 written=Table({n: f"{text} {units[n].text}".rstrip() for n, text in written.items()}),
                 realised=abscissa,
                 loss=abscissa - solution.abscissa,
-                damping_ratio=float(values["damping_ratio"]) if has_ratio else math.nan,  # not with a root at infinity
+                damping_ratio=float(values["damping_ratio"]) if has_ratio else math.nan,  # nan with a root at infinity
                 objective=float(problem.objective(values)) if problem.objective else math.nan,
                 violations=Table(violated | _find_range_violations(problem, design)),
             )
@@ -94,7 +94,7 @@ def round_design(solution: Solution, choices: Sequence[tuple[Sequence[str], int]
 
 
 def _list_cases(solution: Solution, design: Mapping[str, Any]) -> list[Case]:
-    """The listed cases, the worst case of the unrounded design, and the worst cases of the rounded design."""
+    """The cases of the problem, the worst case of the unrounded design, and the worst cases of the rounded design."""
     problem = solution.problem.posed
     cases = [*problem.cases, *filter(None, [solution.worst])]
     if problem.scenarios or problem.tolerances:
@@ -107,15 +107,16 @@ def _find_range_violations(problem: Posed, design: Mapping[str, Any]) -> dict[st
     return {
         f"{name}.{end}": amount
         for name, ends in problem.free.items()
-        for end, limit, side in zip(("min", "max"), ends, (-1.0, 1.0), strict=True)
-        if (amount := side * (float(design[name]) - limit)) > FEASIBILITY_TOLERANCE * max(1.0, abs(limit))
+        for end, limit, sign in zip(("min", "max"), ends, (-1.0, 1.0), strict=True)
+        if (amount := sign * (float(design[name]) - limit)) > FEASIBILITY_TOLERANCE * max(1.0, abs(limit))
     }
 
 
-def _is_short(solution: Solution, name: str) -> bool:
+def _has_few_digits(solution: Solution, name: str) -> bool:
     """Whether a parameter has so few digits that rounding leaves it unchanged."""
     value, unit = solution.parameters[name], unit_of(solution.problem.posed, name)
-    return abs(float(_format_decimal(solution, name, unit, ALONE)) * unit.factor - value) <= _UNROUNDED * abs(value)
+    rounded_value = float(_format_decimal(solution, name, unit, SINGLE_DIGITS)) * unit.factor
+    return abs(rounded_value - value) <= _CONVERSION_ERROR * abs(value)
 
 
 def _format_decimal(solution: Solution, name: str, unit: Unit, digits: int) -> str:
@@ -134,5 +135,5 @@ def _parse_exact(text: str, unit: Unit) -> flint.arb:
     """The decimal number in the unit in which the parameter is stored, at the precision of the context."""
     if unit.factor == _DEGREE:
         return flint.arb(text) * flint.arb.pi() / 180
-    share = Fraction(unit.factor).limit_denominator(_LARGEST_DENOMINATOR)
-    return flint.arb(text) * flint.arb(flint.fmpq(share.numerator, share.denominator))
+    ratio = Fraction(unit.factor).limit_denominator(_LARGEST_DENOMINATOR)
+    return flint.arb(text) * flint.arb(flint.fmpq(ratio.numerator, ratio.denominator))

@@ -16,16 +16,16 @@ _NOT_COVERED = {ANGULAR_FREQUENCY: "frequencies", RADIUS: "the robustness radius
 
 
 def structure_line(problem: Posed, structure: str, abscissa: float, multiple_roots: Sequence[MultipleRoot]) -> str:
-    """The structure of the roots. If its multiple root is not defective, or this is unknown, the sentence says so.
+    """The structure of the roots. If a multiple root is not defective, or this is unknown, the sentence says so.
 
     Args:
         multiple_roots: the multiple roots, rightmost first.
     """
     words = describe_user_structure(problem.model, structure, abscissa > 0)
-    multiple = (
+    relevant_roots = (
         multiple_roots if problem.pattern is not None else [m for m in multiple_roots if m.re == multiple_roots[0].re]
     )
-    if crossing := next((m for m in multiple if not m.exceptional), None):
+    if crossing := next((m for m in relevant_roots if not m.exceptional), None):
         return f"{words}: {describe_crossing(crossing)}"
     if multiple_roots and problem.model.pencil is None and "EP" in f"{problem.locate or ''}{structure}":
         return f"{words}; coefficients cannot tell whether the root is defective"
@@ -69,17 +69,17 @@ def bound_lines(solution: Solution) -> list[str]:
     """The value that no solution can beat, and how we know."""
     bound, problem = solution.bound, solution.problem.posed
     search = f"branch and bound with {bound.solver}, {bound.nodes} nodes, {bound.seconds:.1f} s"
-    floating = f"a floating-point proof, feasibility tolerance {bound.tolerance:.0e}"
-    kind = floating if bound.tolerance else "a proof without a tolerance"
+    floating_proof = f"a floating-point proof, feasibility tolerance {bound.tolerance:.0e}"
+    proof_kind = floating_proof if bound.tolerance else "a proof without a tolerance"
     if solution.status == "infeasible":
-        how = f"{search}; {kind}" if bound.solver else "interval arithmetic"
+        how = f"{search}; {proof_kind}" if bound.solver else "interval arithmetic"
         return [f"proved: no design satisfies all constraints ({how})"] if bound.proven else []
     if not math.isfinite(bound.value):
         return [f"bound: none found in time ({search})"] if bound.seconds else []
     text, value = (problem.minimize or problem.maximize or "").strip(), Unit().number(bound.value, _DIGITS)
     lines = [f"bound: {_state_bound(problem, text, value, bound)}; gap {bound.gap:.1e}"]
     if bound.method == bound.solver.lower():
-        lines.append(f"how: {search}; {kind}")
+        lines.append(f"how: {search}; {proof_kind}")
     elif bound.seconds:
         lines.append(f"how: {search} found none better in time")
     return lines
@@ -94,10 +94,10 @@ def _append_advice(text: str, advice: str) -> str:
     return f"{text}; {advice}" if advice else text
 
 
-def _advise_certify(bound: Bound, first: str) -> str:
+def _advise_certify(bound: Bound, default: str) -> str:
     """Advice on --certify: twice the time if the time ran out; empty if branch and bound cannot solve the problem."""
     if not bound.solver:
-        return first
+        return default
     return f"--certify {max(2 * math.ceil(bound.seconds), 1)} continues the search" if bound.seconds else ""
 
 

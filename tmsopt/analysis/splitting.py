@@ -63,7 +63,7 @@ class Response:
 
 def compute_response(point: RootPoint, name: str) -> Response:
     """Response of a multiple root to a parameter, at the precision of `high_precision`."""
-    k, relative = point.multiplicity, point.relative(name)
+    k, relative = point.multiplicity, point.is_relative(name)
     terms = _expand_terms(point, name)
     if terms is None:
         return Response(name, relative, (), 0, k)
@@ -82,8 +82,8 @@ def _expand_terms(point: RootPoint, name: str) -> list[list[complex]] | None:
     determinant of a g × g matrix that is 0 at the root, so terms of total order below g are 0.
     """
     k, g = point.multiplicity, point.geometric
-    series = point.perturb(name, flint.arb_series([0, point.step(name)], prec=2 * k + 1), doubt=True)
-    rows = [point.taylor(coefficients_of_order(series, m), doubt=True)[: k + 1] for m in range(2 * k + 1)]
+    series = point.perturb(name, flint.arb_series([0, point.step(name)], prec=2 * k + 1), with_errors=True)
+    rows = [point.taylor(coefficients_of_order(series, m), with_errors=True)[: k + 1] for m in range(2 * k + 1)]
     if not all(x.is_finite() for row in rows for x in row) or rows[0][k].contains(0):
         return None
     rows[0][:k] = [flint.acb(0)] * k
@@ -98,33 +98,34 @@ def _confirm_law(point: RootPoint, name: str, branch: Branches) -> Law | None:
     ends = [_find_validity_range(point, name, branch, sign) for sign in (-1, 1)]
     if any(high < 10**_MIN_DECADES * max(low, 10.0 ** _DECADES[0]) for low, high in ends):
         return None
-    of_s = replace(branch, constants=tuple(c * point.unit**branch.denominator for c in branch.constants))
-    return Law(of_s, ends[0][1], ends[1][1], max(low for low, _ in ends))
+    scaled_branch = replace(branch, constants=tuple(c * point.unit**branch.denominator for c in branch.constants))
+    return Law(scaled_branch, ends[0][1], ends[1][1], max(low for low, _ in ends))
 
 
 def _find_validity_range(point: RootPoint, name: str, branch: Branches, sign: int) -> tuple[float, float]:
     """The smallest and the largest sampled |ε| between which the roots obey the law; (0, 0) if they never do."""
 
-    def holds(eps: float) -> bool:
+    def is_obeyed(eps: float) -> bool:
         predicted = branch.shifts(sign * eps)
         scale = max(map(abs, predicted))
         shifted = _expand_locally(point, name, sign * eps, scale)
         # In the variable 1/t the smallest t are the largest roots, which companion eigenvalues give to all digits.
-        row = np.array([midpoint(c / shifted[point.multiplicity].abs_upper()) for c in shifted])
-        row[np.cumsum(np.abs(row)) <= _NEGLIGIBLE_SHARE * np.abs(row).sum()] = 0  # roots that move far more slowly
-        return _measure_deviation(predicted, scale, row) <= DEVIATION
+        coefficients = np.array([midpoint(c / shifted[point.multiplicity].abs_upper()) for c in shifted])
+        sizes = np.abs(coefficients)
+        coefficients[np.cumsum(sizes) <= _NEGLIGIBLE_SHARE * sizes.sum()] = 0  # roots that move far more slowly
+        return _measure_deviation(predicted, scale, coefficients) <= DEVIATION
 
-    visible = _MIN_SHIFT * _measure_scatter(point)
-    decades = [m for m in _DECADES if max(map(abs, branch.shifts(sign * 10.0**m))) > visible]
-    low = next((m for m in decades if holds(10.0**m)), None)
-    if low is None:
+    min_shift = _MIN_SHIFT * _measure_scatter(point)
+    decades = [m for m in _DECADES if max(map(abs, branch.shifts(sign * 10.0**m))) > min_shift]
+    first_decade = next((m for m in decades if is_obeyed(10.0**m)), None)
+    if first_decade is None:
         return 0.0, 0.0
-    lower_end = 10.0**low if low > _DECADES[0] else 0.0
-    first = next((m for m in decades if m > low and not holds(10.0**m)), None)
-    if first is None:
+    lower_end = 10.0**first_decade if first_decade > _DECADES[0] else 0.0
+    first_failure = next((m for m in decades if m > first_decade and not is_obeyed(10.0**m)), None)
+    if first_failure is None:
         return lower_end, 10.0 ** _DECADES[-1]
-    samples = (10.0 ** (first - 1 + share) for share in _DECADE_SHARES)
-    return lower_end, next(filter(holds, samples), 10.0 ** (first - 1))
+    samples = (10.0 ** (first_failure - 1 + share) for share in _DECADE_SHARES)
+    return lower_end, next(filter(is_obeyed, samples), 10.0 ** (first_failure - 1))
 
 
 def _has_fixed_roots(point: RootPoint, name: str, branches: Sequence[Branches], unmoved: int) -> bool:
@@ -133,17 +134,17 @@ def _has_fixed_roots(point: RootPoint, name: str, branches: Sequence[Branches], 
     def count_roots(eps: float, radius: float) -> int | None:
         """Number of roots within a radius; None if no term is larger than the sum of all others."""
         terms = [abs(x) for x in _expand_locally(point, name, eps, radius)]
-        return next((u for u, x in enumerate(terms) if 2 * x > sum(terms, flint.arb(0))), None)
+        return next((count for count, x in enumerate(terms) if 2 * x > sum(terms, flint.arb(0))), None)
 
-    def radii(eps: float) -> list[float]:
+    def list_radii(eps: float) -> list[float]:
         """Radii, in the unit of the root, that should contain only the fixed roots."""
         if not branches:
-            return [max(small, _SCATTER_RADIUS * _measure_scatter(point)) for small in _SMALL_RADII]
+            return [max(radius, _SCATTER_RADIUS * _measure_scatter(point)) for radius in _SMALL_RADII]
         least_shift = min(abs(t) for branch in branches for t in branch.shifts(eps))
-        return [small * least_shift for small in (*_SMALL_RADII, *_WIDE_RADII)]
+        return [radius * least_shift for radius in (*_SMALL_RADII, *_WIDE_RADII)]
 
     changes = [(eps, sign) for eps in _COUNTED_CHANGES for sign in (-1, 1)]
-    return all(any(count_roots(sign * eps, radius) == unmoved for radius in radii(eps)) for eps, sign in changes)
+    return all(any(count_roots(sign * eps, radius) == unmoved for radius in list_radii(eps)) for eps, sign in changes)
 
 
 def _expand_locally(point: RootPoint, name: str, eps: float, scale: float) -> list[Any]:
@@ -160,17 +161,17 @@ def _measure_scatter(point: RootPoint) -> float:
     return float(max(abs(x / terms[k]) ** (1 / (k - j)) for j, x in enumerate(terms[:k])))
 
 
-def _measure_deviation(predicted: Sequence[complex], scale: float, row: NDArray[np.complex128]) -> float:
-    """The largest relative distance of a predicted shift from the nearest true shift; inf if these are too few.
+def _measure_deviation(predicted: Sequence[complex], scale: float, coefficients: NDArray[np.complex128]) -> float:
+    """The largest relative distance of a predicted shift from the nearest true shift; inf if there are too few.
 
     Args:
-        row: coefficients of the polynomial in scale/t, descending.
+        coefficients: coefficients of the polynomial in scale/t, descending.
     """
-    inverse = np.roots(row) if np.all(np.isfinite(row)) else np.zeros(0)
-    true_shifts, worst = list(scale / inverse[inverse != 0]), 0.0
+    inverse = np.roots(coefficients) if np.all(np.isfinite(coefficients)) else np.zeros(0)
+    true_shifts, worst_deviation = list(scale / inverse[inverse != 0]), 0.0
     for t in predicted:
-        nearest = min(range(len(true_shifts)), key=lambda i: abs(true_shifts[i] - t), default=None)
-        if nearest is None:
+        nearest_index = min(range(len(true_shifts)), key=lambda i: abs(true_shifts[i] - t), default=None)
+        if nearest_index is None:
             return np.inf
-        worst = max(worst, abs(true_shifts.pop(nearest) - t) / abs(t))
-    return float(worst)
+        worst_deviation = max(worst_deviation, abs(true_shifts.pop(nearest_index) - t) / abs(t))
+    return float(worst_deviation)

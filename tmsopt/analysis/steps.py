@@ -53,11 +53,11 @@ def step_within(
 def _list_steps(unit: Unit, stored_unit: str, size: float) -> Iterator[LimitStep]:
     """The natural step, and then smaller and smaller steps."""
     size = abs(size) if abs(size) > _ZERO_SIZE else 1.0
-    largest = _round_to_1_2_5(_NATURAL_STEPS.get(stored_unit, _STEP_SHARE * size) / unit.factor)
-    while stored_unit in _NATURAL_STEPS and largest * unit.factor > _MAX_SHARES[stored_unit] * size:
-        largest /= 10
-    step = largest
-    while step >= _MIN_SHARE * largest:
+    largest_step = _round_to_1_2_5(_NATURAL_STEPS.get(stored_unit, _STEP_SHARE * size) / unit.factor)
+    while stored_unit in _NATURAL_STEPS and largest_step * unit.factor > _MAX_SHARES[stored_unit] * size:
+        largest_step /= 10
+    step = largest_step
+    while step >= _MIN_SHARE * largest_step:
         yield LimitStep(step * unit.factor, unit.show(step * unit.factor, 4))
         step = _round_to_1_2_5(step / 2.2)
 
@@ -66,5 +66,5 @@ def _round_to_1_2_5(x: float) -> float:
     """The number 1, 2 or 5 times a power of ten whose ratio to x is nearest to 1."""
     decade = math.floor(math.log10(x))
     choices = [k * 10.0**d for d in (decade, decade + 1) for k in (1, 2, 5)]
-    nearest = min(choices, key=lambda c: abs(math.log(c / x)))
-    return float(f"{nearest:.1g}")
+    nearest_choice = min(choices, key=lambda c: abs(math.log(c / x)))
+    return float(f"{nearest_choice:.1g}")

@@ -55,10 +55,10 @@ def no_design(problem: Posed) -> str:
 def describe_better(solution: Solution, goal: str) -> str:
     """The predicate of a sentence about a better design: it decays faster, or it has a smaller or larger goal."""
     problem, bound = solution.problem.posed, solution.bound
-    by = f" by more than {bound.gap:.1e}" if bound.tolerance else ""
+    margin = f" by more than {bound.gap:.1e}" if bound.tolerance else ""
     if goal != "abscissa" or problem.sense == "maximize" or solution.stability.on_edge:
-        return f"has a {'larger' if problem.sense == 'maximize' else 'smaller'} {goal}{by}"
-    return f"{'decays faster' if solution.abscissa < 0 else 'grows more slowly'}{by}"
+        return f"has a {'larger' if problem.sense == 'maximize' else 'smaller'} {goal}{margin}"
+    return f"{'decays faster' if solution.abscissa < 0 else 'grows more slowly'}{margin}"
 
 
 def _describe_quality(solution: Solution) -> str:
@@ -83,14 +83,14 @@ def _describe_quality(solution: Solution) -> str:
 
 def _warn_of_abscissa_unit(problem: Posed) -> Iterator[str]:
     """Warns that the unit of the abscissa depends on a free parameter."""
-    free = [name for name in ("w", "g") if name in problem.free]
-    if free and problem.parameter_set.root_unit == "√(g/w)" and "abscissa" in (problem.minimize or ""):
+    free_units = [name for name in ("w", "g") if name in problem.free]
+    if free_units and problem.parameter_set.root_unit == "√(g/w)" and "abscissa" in (problem.minimize or ""):
         advice = 'for the fastest decay in seconds write maximize = "decay_rate"'
-        yield f"the abscissa has the unit √(g/w), which varies with {' and '.join(free)}: {advice}"
+        yield f"the abscissa has the unit √(g/w), which varies with {' and '.join(free_units)}: {advice}"
 
 
 def _warn_of_active_bounds(solution: Solution) -> Iterator[str]:
-    """Active bounds that are not physical."""
+    """Warns of active bounds that are not physical limits."""
     problem = solution.problem.posed
     bounds = (f"{name}.{end}" for name in problem.free for end in ("min", "max"))
     active = [bound for bound in bounds if bound in solution.active and bound not in problem.constraints]
@@ -101,7 +101,8 @@ def _warn_of_active_bounds(solution: Solution) -> Iterator[str]:
 
 
 def _describe_bound(problem: Posed, bound: str) -> str:
-    return unit_of(problem, bound).show(split_bound(problem, bound)[2], 10)
+    _, _, value = split_bound(problem, bound)
+    return unit_of(problem, bound).show(value, 10)
 
 
 def _warn_of_reached_bounds(solution: Solution, name: str) -> Iterator[str]:

@@ -13,7 +13,17 @@ from numpy.typing import NDArray
 
 from tmsopt.charts.export import make_dataset, save_layers
 from tmsopt.charts.folder import SCHEMA, Tiles, grid_of, read_folder, write_folder
-from tmsopt.charts.survey import LAYERS, USUAL, Grid, Survey, Tally, add_tallies, layer_faults, limits_of, plan_survey
+from tmsopt.charts.survey import (
+    DEFAULT_LAYERS,
+    LAYERS,
+    Grid,
+    Survey,
+    Tally,
+    add_tallies,
+    layer_faults,
+    limits_of,
+    plan_survey,
+)
 from tmsopt.deprecated import ignore_option
 from tmsopt.errors import InputError, call_faults, count_faults, input_error
 from tmsopt.executor import Crash, here, processes
@@ -28,13 +38,13 @@ from tmsopt.tracing.domain import Domain, domain
 if TYPE_CHECKING:
     from xarray import Dataset
 
-LARGEST = 20_000_000
+MAX_DESIGNS_IN_MEMORY = 20_000_000
 """Largest number of designs of a chart in memory; each takes about 40 bytes."""
 
-TILE = 2**18
-"""Number of designs that are computed together, a tile; this takes about 40 MB."""
+DEFAULT_TILE = 2**18
+"""Default number of designs of a tile. The designs of a tile are computed together, which takes about 40 MB."""
 
-_MAX_WORKERS = 256
+_MAX_WORKERS = 256  # largest number of processes
 
 
 def _layer_property(name: str, meaning: str) -> Any:
@@ -48,8 +58,8 @@ class Chart(Printable):
     Attributes:
         about: description of the chart, as plain data.
         grid: the values along each axis.
-        layers: name → array with the second axis along its rows and the first along its columns, as in an image; a
-            third axis is the first index. Layers in a folder are memory maps.
+        layers: name → array. The last index of an array belongs to the first axis, as in an image. Layers in a folder
+            are memory maps.
         counts: counts over all designs.
         domain: the exact boundaries in a plane, if requested.
         path: the folder of the chart; None for a chart in memory.
@@ -136,8 +146,8 @@ class Chart(Printable):
         names = tuple(self.layers) if layers is None else layers
         if faults := layer_faults(names, list(self.layers)):
             raise InputError(faults)
-        chosen = {n: self.layers[n] for n in names}
-        save_layers(self.problem.posed, Grid(self.axes, self.grid), chosen, as_path(path, "the file to write"))
+        chosen_layers = {n: self.layers[n] for n in names}
+        save_layers(self.problem.posed, Grid(self.axes, self.grid), chosen_layers, as_path(path, "the file to write"))
 
     def to_xarray(self) -> "Dataset":
         """All layers as a dataset with axes and units.
@@ -151,7 +161,7 @@ class Chart(Printable):
     def to_json(self) -> dict[str, Any]:
         """Summary, boundaries and corners, without the arrays."""
         counts, is_plane = self.counts, self.path is None and len(self.grid) == 2
-        parameters = self.asked.posed.parameter_set if self.asked else None  # a folder may not hold its model
+        parameters = self.asked.posed.parameter_set if self.asked else None  # a folder may not hold the model
         grid = Grid(self.axes, self.grid)
         design = grid.design(counts.place) if counts.place >= 0 else None
         data: dict[str, Any] = {
@@ -186,7 +196,7 @@ def chart(
     single: bool = False,
     workers: int = 1,
     fresh: bool = False,
-    tile: int = TILE,
+    tile: int = DEFAULT_TILE,
     boundaries: bool = True,
     progress: Listener | None = None,
 ) -> Chart:
@@ -205,14 +215,13 @@ def chart(
         single: store numbers in single precision.
         workers: number of processes; with 1, no further process is started.
         fresh: move an existing folder aside.
-        tile: number of designs computed together.
+        tile: number of designs that are computed together.
         boundaries: also trace the exact boundary curves, if there are two axes.
         progress: called with a `tmsopt.Progress` from time to time.
 
     Raises:
-        InputError: for bad input; for a damaged folder; for a folder with another chart, with the differences; if a
-            worker crashes.
-        OSError: if the disk is full; tiles recorded before stay valid.
+        InputError: for bad input, for a damaged folder or one with another chart, or if a worker crashes.
+        OSError: if the disk is full; the tiles that are already recorded stay valid.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -227,40 +236,41 @@ def chart(
     if faults := faults + call_faults("progress", progress):
         raise InputError(faults)
     steps = start_steps(progress, "charting", "design") or (lambda *_: None)
-    layer_names = layers if layers is not None else tuple(LAYERS) if folder is None else USUAL
+    layer_names = layers if layers is not None else tuple(LAYERS) if folder is None else DEFAULT_LAYERS
     survey = plan_survey(problem, axes, points, layer_names, quantities, single)
     path, grid, about = None if folder is None else as_path(folder, "a folder"), survey.grid, _describe(survey, tile)
-    if path is None and grid.size > LARGEST:
-        message = f"{grid.size:.3g} designs do not fit into memory; give a folder x.chart, or at most {LARGEST:.0e}"
+    if path is None and grid.size > MAX_DESIGNS_IN_MEMORY:
+        message = f"{grid.size:.3g} designs do not fit into memory; give a folder x.chart, "
+        message += f"or at most {MAX_DESIGNS_IN_MEMORY:.0e} designs"
         raise input_error(message, "points")
-    grid.tiles(tile)  # raises for too many tiles
+    grid.tiles(tile)  # raises an error for too many tiles
     memory = {} if path else {n: np.empty(grid.shape, dtype) for n, dtype in survey.dtypes.items()}
     tiles_context = write_folder(path, about, grid, fresh) if path else nullcontext(Tiles(memory, tile))
     with tiles_context as tiles, processes(workers) if workers > 1 else here() as executor:
-        start = time.perf_counter()
-        remaining = [rows for rows in grid.tiles(tiles.tile) if rows.start not in tiles.tallies]
-        finished = finished_before = add_tallies(tiles.tallies.values()).designs
-        steps(finished, grid.size)
-        for place, result in executor.map(survey.compute, remaining):
+        start_time = time.perf_counter()
+        remaining_tiles = [rows for rows in grid.tiles(tiles.tile) if rows.start not in tiles.tallies]
+        finished_count = old_count = add_tallies(tiles.tallies.values()).designs
+        steps(finished_count, grid.size)
+        for index, result in executor.map(survey.compute, remaining_tiles):
             if isinstance(result, Crash):
                 cause = f"a worker that computed {tile} designs crashed ({result.cause})"
                 raise input_error(f"{cause}; give fewer workers or a smaller tile", "workers")
-            tiles.write(remaining[place], *result)
-            finished += result[1].designs
-            steps(finished, grid.size)
-    seconds, computed = time.perf_counter() - start, finished - finished_before
+            tiles.write(remaining_tiles[index], *result)
+            finished_count += result[1].designs
+            steps(finished_count, grid.size)
+    seconds, computed_count = time.perf_counter() - start_time, finished_count - old_count
     for layer in memory.values():
         layer.flags.writeable = False
     run = {
         "engine": "numpy",
-        **({"designs": computed} if path else {}),
+        **({"designs": computed_count} if path else {}),
         "seconds": seconds,
-        "per_second": computed / seconds,
+        "per_second": computed_count / seconds,
     }
     source_problem = survey.problem.problem
-    edges = domain(source_problem, progress=progress) if boundaries and len(grid.axes) == 2 else None
+    exact_domain = domain(source_problem, progress=progress) if boundaries and len(grid.axes) == 2 else None
     return Chart(
-        about, grid.values, tiles.layers, add_tallies(tiles.tallies.values()), edges, path, run, source_problem
+        about, grid.values, tiles.layers, add_tallies(tiles.tallies.values()), exact_domain, path, run, source_problem
     )
 
 

@@ -28,8 +28,8 @@ def save_layers(problem: Posed, grid: Grid, layers: Layers, path: Path) -> None:
     if path.suffix.lower() == ".nc":
         check_netcdf()
         dataset = make_dataset(problem, grid, layers)
-        with write_atomic(path) as place, netcdf_errors():
-            dataset.to_netcdf(place)
+        with write_atomic(path) as temporary_path, netcdf_errors():
+            dataset.to_netcdf(temporary_path)
         return
     axes = _name_axes(grid, layers)
     about = {"title": problem.title, "model": problem.model.name, "fixed": dict(problem.fixed)}
@@ -37,7 +37,7 @@ def save_layers(problem: Posed, grid: Grid, layers: Layers, path: Path) -> None:
     if problem.model.statement is not None:
         about["statement"] = dict(problem.model.statement)
     arrays: dict[str, Any] = dict(zip(axes, grid.values, strict=True)) | dict(layers)
-    with write_atomic(path) as place, place.open("wb") as stream:
+    with write_atomic(path) as temporary_path, temporary_path.open("wb") as stream:
         np.savez_compressed(stream, about=np.array(json.dumps(about)), **arrays)
 
 
@@ -60,10 +60,10 @@ def make_dataset(problem: Posed, grid: Grid, layers: Layers) -> Any:
     """
     xarray, axes, parameters = import_optional("xarray"), _name_axes(grid, layers), problem.parameter_set
     # The climate and forecast conventions separate flag meanings by blanks.
-    words = " ".join(n.replace(" ", "_") for n in CLASSES)
-    classes = {"flag_values": np.arange(len(CLASSES), dtype=np.int8), "flag_meanings": words}
+    meanings = " ".join(n.replace(" ", "_") for n in CLASSES)
+    class_attributes = {"flag_values": np.arange(len(CLASSES), dtype=np.int8), "flag_meanings": meanings}
     variables = {
-        n: (axes[::-1], a.view(np.int8) if a.dtype == bool else a, classes if n == "kind" else {})
+        n: (axes[::-1], a.view(np.int8) if a.dtype == bool else a, class_attributes if n == "kind" else {})
         for n, a in layers.items()
     }
     coordinates = {

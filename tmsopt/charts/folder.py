@@ -33,9 +33,10 @@ from tmsopt.problem.problem import Problem
 
 SCHEMA = 1
 
-_ABOUT, _TILES, _LOCK = "about.json", "tiles.jsonl", "chart.lock"
-_LONG_ABOUT, _LONG_LINE = 16_000_000, 10_000  # bytes
-_SYNC = 1.0  # seconds between records of finished tiles
+_ABOUT_FILE, _TILES_FILE, _LOCK_FILE = "about.json", "tiles.jsonl", "chart.lock"
+_MAX_ABOUT_BYTES = 16_000_000  # largest size of about.json
+_MAX_LINE_BYTES = 10_000  # largest size of a line of tiles.jsonl
+_SYNC_INTERVAL = 1.0  # seconds from one record of finished tiles to the next
 
 Layers = Mapping[str, NDArray[Any]]
 
@@ -45,7 +46,7 @@ class Tiles:
     """Layers that are filled tile by tile.
 
     Attributes:
-        layers: arrays or memory maps; the latter are written through their files, so that a full disk raises an error.
+        layers: arrays or memory maps. Memory maps are written through their files, so that a full disk raises an error.
         tile: number of designs of a tile.
         tallies: first row of a finished tile → its counts.
         record: file that lists the finished tiles, for memory maps.
@@ -73,7 +74,7 @@ class Tiles:
         self.tallies[rows.start] = counts
         least = counts.least if counts.place >= 0 else None  # JSON has no nan
         self._unrecorded += f"{json.dumps({'row': rows.start, **asdict(counts), 'least': least})}\n".encode()
-        if time.monotonic() - self._sync_time > _SYNC:
+        if time.monotonic() - self._sync_time > _SYNC_INTERVAL:
             self.sync()
 
     def sync(self) -> None:
@@ -102,30 +103,32 @@ def write_folder(path: Path, about: dict[str, Any], grid: Grid, fresh: bool) -> 
         fresh: move an existing folder aside.
 
     Raises:
-        InputError: for a damaged folder, a folder with another chart or one that another process writes; if the disk
-            is full.
+        InputError: if the folder is damaged, holds another chart or is written by another process, or if the disk is
+            full.
     """
-    lock = FileLock(path / _LOCK, timeout=0)
+    lock = FileLock(path / _LOCK_FILE, timeout=0)
     with _refuse_write_errors(path):
         if fresh and os.path.lexists(path):
             with lock:
                 move_aside(path)
         if not path.exists():
             bytes_per_design = sum(np.dtype(layer["dtype"]).itemsize for layer in about["layers"].values())
-            needed, free = bytes_per_design * grid.size, shutil.disk_usage(path.parent).free
-            if needed > free:
-                raise OSError(errno.ENOSPC, f"takes {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free")
+            needed_bytes, free_bytes = bytes_per_design * grid.size, shutil.disk_usage(path.parent).free
+            if needed_bytes > free_bytes:
+                raise OSError(
+                    errno.ENOSPC, f"takes {needed_bytes / 1e9:.1f} GB, and {free_bytes / 1e9:.1f} GB are free"
+                )
             path.mkdir()
-        elif not any((path / n).exists() for n in (_ABOUT, _LOCK)):
+        elif not any((path / n).exists() for n in (_ABOUT_FILE, _LOCK_FILE)):
             raise _make_no_chart_error(path)
         held_lock = lock.acquire()
     with held_lock:
-        if not os.path.lexists(path / _ABOUT):
+        if not os.path.lexists(path / _ABOUT_FILE):
             with _refuse_write_errors(path):
                 _create(path, about, grid)
         existing, _, tiles = read_folder(path)
-        ignored = {"versions": None, "tile": None}
-        if differences := list(list_differences(existing | ignored, about | ignored)):
+        ignored_keys = {"versions": None, "tile": None}
+        if differences := list(list_differences(existing | ignored_keys, about | ignored_keys)):
             message = f"holds another chart ({'; '.join(differences)}); give another name, or --fresh to move it aside"
             raise input_error(message, str(path))
         try:
@@ -150,20 +153,20 @@ def _layer_path(name: str) -> str:
 
 
 def _make_no_chart_error(path: Path) -> InputError:
-    return input_error(f"'{path}' is no chart: it has no {_ABOUT}; give a chart's folder or a new name")
+    return input_error(f"'{path}' is no chart: it has no {_ABOUT_FILE}; give a chart's folder or a new name")
 
 
 def _create(path: Path, about: Mapping[str, Any], grid: Grid) -> None:
     """Create the files of a new chart. The last one is about.json: without it, the next run starts again."""
     for part in ("axes", "layers"):
-        shutil.rmtree(path / part, ignore_errors=True)  # left by a killed process
+        shutil.rmtree(path / part, ignore_errors=True)  # a killed process may have left it
         (path / part).mkdir()
     for name, values in zip(grid.axes, grid.values, strict=True):
         np.save(path / "axes" / f"{name}.npy", values)
     for name, layer in about["layers"].items():
         np.lib.format.open_memmap(path / _layer_path(name), "w+", np.dtype(layer["dtype"]), grid.shape)
-    (path / _TILES).touch()
-    write_text(path / _ABOUT, json.dumps(about, indent=2, ensure_ascii=False))
+    (path / _TILES_FILE).touch()
+    write_text(path / _ABOUT_FILE, json.dumps(about, indent=2, ensure_ascii=False))
 
 
 # Reading
@@ -193,7 +196,7 @@ class _About(BaseModel):
     tile: Annotated[int, Field(ge=1)]
 
 
-_TALLY = TypeAdapter(Tally)
+_TALLY_ADAPTER = TypeAdapter(Tally)
 
 
 def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
@@ -202,11 +205,11 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
     Raises:
         InputError: if it is not the folder of a chart, or is damaged.
     """
-    if not (path / _ABOUT).exists():
+    if not (path / _ABOUT_FILE).exists():
         raise _make_no_chart_error(path)
-    name = _ABOUT
+    name = _ABOUT_FILE
     try:
-        about = from_json(read_text(str(_find_file(path, name)), "JSON file", _LONG_ABOUT), _LONG_ABOUT)
+        about = from_json(read_text(str(_find_file(path, name)), "JSON file", _MAX_ABOUT_BYTES), _MAX_ABOUT_BYTES)
         _About.model_validate(about, strict=True)
         problem, grid, layers = _state_problem(about), grid_of(about), {}
         if grid.size > MAX_DESIGNS:
@@ -216,7 +219,7 @@ def read_folder(path: Path) -> tuple[dict[str, Any], Problem | None, Tiles]:
             layers[layer] = array = np.lib.format.open_memmap(_find_file(path, name), "r")
             if array.shape != grid.shape or array.dtype.str != description.get("dtype") or not array.flags.c_contiguous:
                 raise ValueError(f"not an array of shape {grid.shape} and type {description.get('dtype')}")
-        name = _TILES
+        name = _TILES_FILE
         record = _find_file(path, name)
         tallies, end = _read_record(record, about["tile"], grid)
     except Exception as error:  # a damaged folder can raise any error; a link to itself raises a RuntimeError
@@ -244,13 +247,13 @@ def _state_problem(about: Mapping[str, Any]) -> Problem | None:
 
 def _find_file(path: Path, name: str) -> Path:
     """Path of a regular file in the folder; links are refused, so that nothing outside of the folder is written."""
-    place = path.resolve() / name
-    if place.resolve() != place or not place.is_file():
+    file_path = path.resolve() / name
+    if file_path.resolve() != file_path or not file_path.is_file():
         raise ValueError("no file, or a link")
-    return place
+    return file_path
 
 
-def _read_record(place: Path, tile: int, grid: Grid) -> tuple[dict[int, Tally], int]:
+def _read_record(record: Path, tile: int, grid: Grid) -> tuple[dict[int, Tally], int]:
     """Read the record of tiles.
 
     Returns:
@@ -258,12 +261,12 @@ def _read_record(place: Path, tile: int, grid: Grid) -> tuple[dict[int, Tally], 
     """
     tallies, end = dict[int, Tally](), 0
     tiles = {rows.start: rows for rows in grid.tiles(tile)}
-    for line in read_lines(str(place), "JSON record", MAX_TILES * _LONG_LINE, _LONG_LINE):
+    for line in read_lines(str(record), "JSON record", MAX_TILES * _MAX_LINE_BYTES, _MAX_LINE_BYTES):
         if not line.endswith("\n"):
-            break  # cut off while it was written
+            break  # the process was stopped while it wrote this line
         end += len(line)
         entry = {n: x for n, x in from_json(line).items() if x is not None}
-        row, counts = entry["row"], _TALLY.validate_python(entry)
+        row, counts = entry["row"], _TALLY_ADAPTER.validate_python(entry)
         if counts.designs != len(tiles.get(row, ())) * grid.shape[-1] or not -1 <= counts.place < grid.size:
             raise ValueError(f"{line:.100} is no tile")
         tallies[row] = counts

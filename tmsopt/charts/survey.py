@@ -1,4 +1,8 @@
-"""Grids over two or three parameters, and surveys, which compute layers for their designs a few rows at a time."""
+"""Grids of designs over two or three parameters, and surveys of a grid.
+
+A layer is an array with one number for each design of a grid, such as its abscissa. A survey computes layers, a few
+rows of the grid at a time.
+"""
 
 import math
 import operator
@@ -29,10 +33,10 @@ LAYERS: Mapping[str, DTypeLike] = {
 }
 """Layers that a chart can have → their types; `Chart` explains them."""
 
-USUAL = tuple(LAYERS)[:-1]
-"""Default layers of a chart in a folder."""
+DEFAULT_LAYERS = tuple(LAYERS)[:-1]
+"""Default layers of a chart that is written to a folder."""
 
-USUAL_POINTS: Mapping[int, tuple[int, ...]] = {2: (400, 300), 3: (120, 100, 80)}
+DEFAULT_POINTS: Mapping[int, tuple[int, ...]] = {2: (400, 300), 3: (120, 100, 80)}
 """Number of axes → default numbers of points along them."""
 
 MAX_DESIGNS = 10**9
@@ -68,7 +72,7 @@ class Grid:
         return math.prod(self.shape)
 
     def columns(self, rows: range) -> dict[str, Array]:
-        """Parameters of a few rows: that of the first axis has shape (1, n), the others have shape (len(rows), 1)."""
+        """Parameters of a few rows, of shape (1, n) for the first axis, and of shape (len(rows), 1) for the others."""
         indices = np.unravel_index(np.arange(rows.start, rows.stop), self.shape[:-1])
         slow_axes = zip(self.axes[:0:-1], self.values[:0:-1], indices, strict=True)
         return {self.axes[0]: self.values[0][None, :]} | {n: values[index][:, None] for n, values, index in slow_axes}
@@ -78,9 +82,9 @@ class Grid:
         axes = zip(self.axes, self.values, strict=True)
         return {n: {"min": float(v[0]), "max": float(v[-1]), "points": len(v)} for n, v in axes}
 
-    def design(self, place: int) -> dict[str, float]:
+    def design(self, index: int) -> dict[str, float]:
         """Parameters of the design at an index of the flat arrays."""
-        indices = np.unravel_index(place, self.shape)[::-1]
+        indices = np.unravel_index(index, self.shape)[::-1]
         return {n: float(v[k]) for n, v, k in zip(self.axes, self.values, indices, strict=True)}
 
     def tiles(self, points: int) -> list[range]:
@@ -105,8 +109,9 @@ class Tally:
         designs: number of designs.
         classes: number of designs in each class; empty without the layer ``kind``.
         satisfied: number of designs that satisfy every inequality; None without that layer.
-        least: least abscissa of the designs that satisfy every inequality; nan if there is none.
-        place: index of that least abscissa in the flat arrays, the first index if it occurs again; -1 if there is none.
+        least: least abscissa of the designs that satisfy every inequality; nan if there is no such design.
+        place: index of the design with this abscissa in the flat arrays; the first index if there are several such
+            designs, -1 if there is none.
         fallbacks: number of designs whose roots were computed as eigenvalues of a companion matrix.
     """
 
@@ -129,7 +134,7 @@ class Survey:
 
     Attributes:
         dtypes: layer → its type, for names among `LAYERS` and for quantities.
-        quantities: name → expression of an additional layer.
+        quantities: name of an additional layer → its expression.
         formulas: functions that need no roots, including the coefficients.
         root_formulas: functions that need the roots.
     """
@@ -157,8 +162,8 @@ class Survey:
                 root_quantities = {"abscissa": motion.abscissa, "damping_ratio": ratio}
                 values |= root_quantities | self.root_formulas(columns | root_quantities)
             if {"satisfied", "margin"} & layers:
-                sides = [-c.sign * values[_LIMIT + n] for n, c in limits_of(self.problem).items()]
-                values["margin"] = reduce(np.minimum, sides, np.inf)
+                margins = [-c.sign * values[_LIMIT + n] for n, c in limits_of(self.problem).items()]
+                values["margin"] = reduce(np.minimum, margins, np.inf)
                 values["satisfied"] = values["margin"] >= 0
             values |= {n: values[_QUANTITY + n] for n in self.quantities}
             full_arrays = {n: np.broadcast_to(values[n], shape) for n in layers}
@@ -179,11 +184,14 @@ def plan_survey(
     problem: ProblemSource,
     axes: Sequence[str] | None = None,
     points: Sequence[int] | None = None,
-    layers: Sequence[str] = USUAL,
+    layers: Sequence[str] = DEFAULT_LAYERS,
     quantities: Mapping[str, str] | None = None,
-    single: bool = False,
+    single_precision: bool = False,
 ) -> Survey:
     """Validate the arguments of `chart` and plan its survey.
+
+    Args:
+        single_precision: store numbers in single precision; see `chart` for the other arguments.
 
     Raises:
         InputError: unless two or three parameters are free and the axes name them; for bad numbers of points, unknown
@@ -191,7 +199,7 @@ def plan_survey(
     """
     problem = pose(problem)
     names = axes_of(problem, axes)
-    sizes = _sizes(USUAL_POINTS[len(names)] if points is None else points, len(names))
+    point_counts = _parse_point_counts(DEFAULT_POINTS[len(names)] if points is None else points, len(names))
     user_layers = {} if quantities is None else quantities
     faults = layer_faults(layers, list(LAYERS)) + table_faults(
         "quantities", user_layers, "{'wheel_load': 'load_front/2'}"
@@ -216,8 +224,8 @@ def plan_survey(
     types = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *user_layers)}
     return Survey(
         problem,
-        Grid(names, tuple(np.linspace(*problem.free[n], m) for n, m in zip(names, sizes, strict=True))),
-        {n: np.dtype(np.float32) if single and d == np.float64 else d for n, d in types.items()},
+        Grid(names, tuple(np.linspace(*problem.free[n], m) for n, m in zip(names, point_counts, strict=True))),
+        {n: np.dtype(np.float32) if single_precision and d == np.float64 else d for n, d in types.items()},
         dict(user_layers),
         formulas=array_function(problem, {n: e for n, e in expressions.items() if n not in root_expressions}),
         root_formulas=array_function(problem, root_expressions),
@@ -237,46 +245,48 @@ def axes_of(problem: Posed, axes: Sequence[str] | None = None) -> tuple[str, ...
     Raises:
         InputError: unless two or three parameters are free and the axes name them.
     """
-    free = list(problem.free)
-    if len(free) not in (2, 3):
-        message = f"a grid needs two or three free parameters, and {len(free)} are free ({', '.join(free) or 'none'})"
-        fixed = [n for n in ("Fr", "v", *problem.fixed) if n in problem.fixed]
-        advice = f"; write e.g. {example_of(problem.parameter_set[fixed[0]])[1]}" if fixed else ""
-        raise input_error(message + ("; fix the others" if len(free) > 3 else advice), "parameters")
-    if axes is not None and (list_faults("axes", axes, "") or sorted(map(str, axes)) != sorted(free)):
-        raise input_error(f"found {axes!r}; accepted: {' and '.join(free)}", "axes")
-    return tuple(axes or free)
+    free_names = list(problem.free)
+    if len(free_names) not in (2, 3):
+        names_text = ", ".join(free_names) or "none"
+        message = f"a grid needs two or three free parameters, and {len(free_names)} are free ({names_text})"
+        fixed_names = [n for n in ("Fr", "v", *problem.fixed) if n in problem.fixed]
+        advice = f"; write e.g. {example_of(problem.parameter_set[fixed_names[0]])[1]}" if fixed_names else ""
+        raise input_error(message + ("; fix the others" if len(free_names) > 3 else advice), "parameters")
+    if axes is not None and (list_faults("axes", axes, "") or sorted(map(str, axes)) != sorted(free_names)):
+        raise input_error(f"found {axes!r}; accepted: {' and '.join(free_names)}", "axes")
+    return tuple(axes or free_names)
 
 
-def _sizes(points: Any, count: int) -> tuple[int, ...]:
+def _parse_point_counts(points: Any, count: int) -> tuple[int, ...]:
     try:
-        sizes = tuple(map(operator.index, points))
+        counts = tuple(map(operator.index, points))
     except (TypeError, ValueError):
-        sizes = ()
-    if len(sizes) != count or min(sizes) < 2 or max(sizes) > MAX_AXIS_POINTS or math.prod(sizes) > MAX_DESIGNS:
+        counts = ()
+    if len(counts) != count or min(counts) < 2 or max(counts) > MAX_AXIS_POINTS or math.prod(counts) > MAX_DESIGNS:
         number = ("two", "three")[count - 2]
         accepted = (
             f"{number} whole numbers, each from 2 to {MAX_AXIS_POINTS}, with a product of {MAX_DESIGNS:.0e} or less"
         )
         raise input_error(f"found {points!r}; accepted: {accepted}", "points")
-    return sizes
+    return counts
 
 
-def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 0) -> Tally:
-    """Count over a tile; its first design has the index `first` in the flat arrays of the chart."""
+def count_tile(layers: Mapping[str, NDArray[Any]], first_index: int, fallbacks: int = 0) -> Tally:
+    """Count over a tile; its first design has the index `first_index` in the flat arrays of the chart."""
     kind, satisfied, abscissa = (layers.get(n) for n in ("kind", "satisfied", "abscissa"))
-    least, place = math.nan, -1
+    least_abscissa, least_index = math.nan, -1
     if abscissa is not None:
-        allowed = np.where(np.isfinite(abscissa) & (True if satisfied is None else satisfied), abscissa, np.inf)
-        best = int(allowed.argmin())
-        if allowed.flat[best] < np.inf:
-            least, place = float(allowed.flat[best]), first + best
+        is_allowed = np.isfinite(abscissa) & (True if satisfied is None else satisfied)
+        allowed = np.where(is_allowed, abscissa, np.inf)
+        best_index = int(allowed.argmin())
+        if allowed.flat[best_index] < np.inf:
+            least_abscissa, least_index = float(allowed.flat[best_index]), first_index + best_index
     return Tally(
         next(iter(layers.values())).size,
         () if kind is None else tuple(np.bincount(kind.ravel(), minlength=len(CLASSES)).tolist()),
         None if satisfied is None else int(np.count_nonzero(satisfied)),
-        least,
-        place,
+        least_abscissa,
+        least_index,
         fallbacks,
     )
 
@@ -284,13 +294,13 @@ def count_tile(layers: Mapping[str, NDArray[Any]], first: int, fallbacks: int = 
 def add_tallies(tallies: Iterable[Tally]) -> Tally:
     """Add the counts of several tiles, in any order."""
     tally_list = [*tallies]
-    best = min((t for t in tally_list if t.place >= 0), key=lambda t: (t.least, t.place), default=Tally())
-    satisfied = [t.satisfied for t in tally_list if t.satisfied is not None]
+    best_tally = min((t for t in tally_list if t.place >= 0), key=lambda t: (t.least, t.place), default=Tally())
+    satisfied_counts = [t.satisfied for t in tally_list if t.satisfied is not None]
     return Tally(
         sum(t.designs for t in tally_list),
         tuple(map(sum, zip(*(t.classes for t in tally_list), strict=True))),
-        sum(satisfied) if satisfied else None,
-        best.least,
-        best.place,
+        sum(satisfied_counts) if satisfied_counts else None,
+        best_tally.least,
+        best_tally.place,
         sum(t.fallbacks for t in tally_list),
     )

@@ -72,12 +72,12 @@ class ChartCommand(WithPage, WithPlot, OnFile):
             sys.exit(INTERRUPTED)
 
     def _chart(self, folder: Path | None) -> Reply:
-        from tmsopt.charts import USUAL, axes_of, check_netcdf
+        from tmsopt.charts import DEFAULT_LAYERS, axes_of, check_netcdf
 
         if self.output is not None and self.output.suffix.lower() == ".nc":
             check_netcdf()
         problem = take_nominal(tmsopt.load(self.file).posed)
-        names, layers = axes_of(problem, self.axes), self.layers or USUAL
+        names, layers = axes_of(problem, self.axes), self.layers or DEFAULT_LAYERS
         is_whole = folder is None and len(names) == 2  # in memory, with all layers and boundaries
         self._check_plot(len(names))
         slice_values = self._read_slice(problem)

@@ -7,7 +7,7 @@ from tmsopt.analysis import NOT_COVERED, NOT_MINIMAL, STRICT, Response
 from tmsopt.analysis.diagnosis import Diagnosis
 from tmsopt.analysis.explain import Explanation
 from tmsopt.analysis.optimality import Optimality, RightmostRoot
-from tmsopt.analysis.rounding import ALONE, RoundedDesign
+from tmsopt.analysis.rounding import SINGLE_DIGITS, RoundedDesign
 from tmsopt.analysis.splitting import DEVIATION, Law
 from tmsopt.documents.blocks import (
     Badge,
@@ -51,7 +51,7 @@ def write_explanation(explanation: Explanation, _level: Level) -> Parts:
     if explanation.precision:
         yield tabulate_rounding(explanation)
     if explanation.worst:
-        yield f"rounding {explanation.worst} alone to {ALONE} digits has the largest effect"
+        yield f"rounding {explanation.worst} alone to {SINGLE_DIGITS} digits has the largest effect"
 
 
 def describe_rounding(explanation: Explanation) -> str:
@@ -65,14 +65,14 @@ def describe_rounding(explanation: Explanation) -> str:
     stable = explanation.abscissa < -_ZERO
     sufficient_rows = takewhile(lambda row: _is_near(row, explanation) and not row.violations, reversed(rows))
     fewest = [None, *sufficient_rows][-1]  # with still fewer digits a design may be good by chance
-    rounded_design = next((row for row in rows if row.digits == ALONE), None)
+    rounded_design = next((row for row in rows if row.digits == SINGLE_DIGITS), None)
     parts, unstable = [], False
-    if stable and rounded_design and rounded_design.realised < 0 and (fewest is None or fewest.digits > ALONE):
-        parts.append(f"with {ALONE} digits the design {_describe_cost(rounded_design, explanation)}")
+    if stable and rounded_design and rounded_design.realised < 0 and (fewest is None or fewest.digits > SINGLE_DIGITS):
+        parts.append(f"with {SINGLE_DIGITS} digits the design {_describe_cost(rounded_design, explanation)}")
     if stable and rounded_design and not rounded_design.realised < 0:
         alone, unstable = explanation.rounding.get(explanation.worst), True
         worst = f" ({explanation.worst} alone: {alone.written[explanation.worst]})" if alone else ""
-        parts.append(f"with {ALONE} digits the design is unstable{worst}")
+        parts.append(f"with {SINGLE_DIGITS} digits the design is unstable{worst}")
     last = fewest or rows[-1]
     effect = (_describe_benefit if fewest else _describe_cost)(last, explanation)
     parts.append(f"with {last.digits} digits {'it' if parts else 'the design'} {effect}")

@@ -3,7 +3,7 @@
 The coefficients are polynomials in y with rational coefficients. A root 0 occurs where aₙ(y) = 0, a root at infinity
 where a0(y) = 0, a pair ± iω where the resultant of the even and the odd part is 0, and a multiple root where the
 discriminant is 0. Interval arithmetic isolates the roots y of these polynomials. So no y is missed, even if it is very
-close to another one. Factors that are present for every y, such as a root 0, are split off first.
+close to another one. Factors that are present for every y, such as s for a root 0, are split off first.
 """
 
 import math
@@ -89,23 +89,22 @@ def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, b
     lower, upper = rational(lower), None if upper == math.inf else rational(upper)
     p = _join_rows([flint.fmpq_poly([*map(rational, c)]) for c in reversed(coefficients)])
     a, split = _split_rows(p), _split_factors(p)
-    places = {
+    values_by_kind = {
         kind: _isolate_real_roots(q, lower, upper)
         for kind, q in _list_event_polynomials(a, split).items()
         if not q.is_zero()
     }
-    marks = sorted({y for ys in places.values() for y in ys})
-    cells = list(_list_cells(marks, lower, upper))
+    critical_values = sorted({y for ys in values_by_kind.values() for y in ys})
+    cells = list(_list_cells(critical_values, lower, upper))
     stable, damped = zip(*(_classify(_evaluate_at(a, middle)) for _, _, middle in cells), strict=True)
-    permanent = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.repeated}
-    marginal = [any(permanent.values()) and _is_marginal(split, middle) for _, _, middle in cells]
+    is_permanent = {"capsize": split.zeros > 0, "weave": len(split.mirrored) > 1, "EP2": split.has_repeated_factor}
+    marginal = [any(is_permanent.values()) and _is_marginal(split, middle) for _, _, middle in cells]
     is_bounded = [is_stable or is_marginal for is_stable, is_marginal in zip(stable, marginal, strict=True)]
-    changed = {float(y): is_bounded[k] != is_bounded[k + 1] for k, y in enumerate(marks)}
-    always = {"infinity": len(a) < len(coefficients)} | permanent
+    has_change = {float(y): is_bounded[k] != is_bounded[k + 1] for k, y in enumerate(critical_values)}
     found = (
-        Crossing(float(y), *event, changed[float(y)])
-        for y in marks
-        for kind, values in places.items()
+        Crossing(float(y), *event, has_change[float(y)])
+        for y in critical_values
+        for kind, values in values_by_kind.items()
         if y in values
         for event in _find_events(a, split, kind, y)
     )
@@ -113,7 +112,7 @@ def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, b
         () if bands_only else tuple(found),
         _merge_bands(cells, stable),
         _merge_bands(cells, damped),
-        tuple(kind for kind, holds in always.items() if holds),
+        tuple(kind for kind, holds in ({"infinity": len(a) < len(coefficients)} | is_permanent).items() if holds),
         _merge_bands(cells, marginal),
         split.zeros,
     )
@@ -140,45 +139,44 @@ class _Split:
         mirrored: product of the distinct factors that are even in s, with roots s and −s.
         other_factors: product of the other distinct factors.
         squarefree: p without repeated factors: mirrored times other_factors, times s if s divides p.
-        repeated: whether a factor other than s is repeated.
-        repeats_mirrored: whether an even factor is repeated.
+        has_repeated_factor: whether a factor other than s is repeated.
+        has_repeated_mirrored_factor: whether an even factor is repeated.
     """
 
     zeros: int
     mirrored: list[Any]
     other_factors: list[Any]
     squarefree: list[Any]
-    repeated: bool
-    repeats_mirrored: bool
+    has_repeated_factor: bool
+    has_repeated_mirrored_factor: bool
 
 
 def _split_factors(p: Any) -> _Split:
     zeros = int(min(power for power, _ in p.monoms()))
     p /= _S**zeros
-    factors = [(f, times) for f, times in p.factor_squarefree()[1] if f.degrees()[0] > 0]
-    once = math.prod((f for f, _ in factors), start=_S**0)
-    mirrored = once.gcd(once.compose(-_S, _Y))
-    repeats_mirrored = p.gcd(p.compose(-_S, _Y)).degrees()[0] > mirrored.degrees()[0]
-    other_factors, squarefree = _split_rows(once / mirrored), _split_rows(once * _S if zeros else once)
+    factors = [(f, power) for f, power in p.factor_squarefree()[1] if f.degrees()[0] > 0]
+    distinct_product = math.prod((f for f, _ in factors), start=_S**0)
+    mirrored = distinct_product.gcd(distinct_product.compose(-_S, _Y))
+    has_repeated_mirrored_factor = p.gcd(p.compose(-_S, _Y)).degrees()[0] > mirrored.degrees()[0]
     return _Split(
         zeros,
         _split_rows(mirrored),
-        other_factors,
-        squarefree,
-        any(times > 1 for _, times in factors),
-        repeats_mirrored,
+        _split_rows(distinct_product / mirrored),
+        _split_rows(distinct_product * _S if zeros else distinct_product),
+        any(power > 1 for _, power in factors),
+        has_repeated_mirrored_factor,
     )
 
 
 def _list_event_polynomials(a: Sequence[Any], split: _Split) -> dict[str, Any]:
     """Polynomials in y whose roots are the crossings of each kind."""
     even, odd = (_join_rows(split.other_factors[::-1][k::2]) for k in (0, 1))
-    once = _join_rows(split.squarefree[::-1])
+    distinct_product = _join_rows(split.squarefree[::-1])
     return {
         "capsize": split.mirrored[-1] * split.other_factors[-1],
         "infinity": a[0],
         "weave": _split_rows(even.resultant(odd, "s"))[0] if len(split.other_factors) > 1 else flint.fmpq_poly(),
-        "EP2": _split_rows(once.discriminant("s"))[0] if len(split.squarefree) > 1 else flint.fmpq_poly(),
+        "EP2": _split_rows(distinct_product.discriminant("s"))[0] if len(split.squarefree) > 1 else flint.fmpq_poly(),
     }
 
 
@@ -202,27 +200,28 @@ def _evaluate_at(rows: Sequence[Any], y: Any) -> list[Any]:
 def _isolate_real_roots(polynomial: Any, lower: Any, upper: Any | None) -> list[Any]:
     """Distinct real roots between two ends, as fractions correct to `DIGITS`."""
     with flint.ctx.workdps(DIGITS):
-        real = [rational(z.real) for z, _ in polynomial.numer().complex_roots() if z.imag == 0]
-    return sorted(y for y in real if y > lower and (upper is None or y < upper))
+        real_roots = [rational(z.real) for z, _ in polynomial.numer().complex_roots() if z.imag == 0]
+    return sorted(y for y in real_roots if y > lower and (upper is None or y < upper))
 
 
 def _is_marginal(split: _Split, y: Any) -> bool:
     """Whether no root is right of the axis and all roots on the axis are simple, apart from roots 0."""
-    others, mirrored = _evaluate_at(split.other_factors, y), _evaluate_at(split.mirrored, y)
-    if split.repeats_mirrored or not _classify(others)[0]:
+    other_factor, mirrored_factor = _evaluate_at(split.other_factors, y), _evaluate_at(split.mirrored, y)
+    is_stable, _ = _classify(other_factor)
+    if split.has_repeated_mirrored_factor or not is_stable:
         return False
-    return all(w.im == 0 and w.re < 0 for w in exact_roots(mirrored[::2]))  # in w = s²
+    return all(w.im == 0 and w.re < 0 for w in exact_roots(mirrored_factor[::2]))  # in w = s²
 
 
 def _find_events(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator[tuple[str, Root, bool]]:
-    """Kind, root and whether the root is rightmost, for each crossing at y. A mirrored real pair is no crossing."""
+    """For each crossing at y: kind, root, and whether the root is rightmost. A mirrored real pair is no crossing."""
     if kind == "infinity":
         yield kind, Root(math.nan, 0.0), False
         return
     coefficients = _strip_leading_zeros(_evaluate_at(a, y))
-    size = _bound_roots(a, y, coefficients)
+    size = _measure_roots(a, y, coefficients)
     roots = _cluster_roots(coefficients, size)
-    line = max((r.re for r in roots), default=math.nan)
+    rightmost_part = max((r.re for r in roots), default=math.nan)
 
     def count_roots(part: Sequence[Any], root: Root) -> int:
         """Multiplicity of a root in a factor."""
@@ -231,28 +230,31 @@ def _find_events(a: Sequence[Any], split: _Split, kind: str, y: Any) -> Iterator
             o.multiplicity for o in part_roots if abs(complex(o.re - root.re, o.im - root.im)) <= _SAME_ROOT * size
         )
 
-    holds: dict[str, Callable[[Root], bool]] = {
+    is_crossing: dict[str, Callable[[Root], bool]] = {
         "capsize": lambda r: r.re == r.im == 0,
         "weave": lambda r: r.re == 0 < r.im and count_roots(split.other_factors, r) > 0,
         "EP2": lambda r: r.multiplicity > 1 and r.im >= 0 and count_roots(split.squarefree, r) > 1,
     }
-    for root in filter(holds[kind], roots):
+    for root in filter(is_crossing[kind], roots):
         name = f"{'CEP' if root.im else 'EP'}{root.multiplicity}" if kind == "EP2" else kind
-        yield name, root, root.re >= line - _SAME_ROOT * size
+        yield name, root, root.re >= rightmost_part - _SAME_ROOT * size
 
 
 def _strip_leading_zeros(coefficients: Sequence[Any]) -> Sequence[Any]:
     """The coefficients without leading zeros (within the digits of y), whose roots are at infinity."""
-    largest = max(abs(c) for c in coefficients)
-    first = next((k for k, c in enumerate(coefficients) if abs(c) > _ZERO_COEFFICIENT * largest), len(coefficients) - 1)
-    return coefficients[first:]
+    max_zero = _ZERO_COEFFICIENT * max(abs(c) for c in coefficients)
+    first_index = next((k for k, c in enumerate(coefficients) if abs(c) > max_zero), len(coefficients) - 1)
+    return coefficients[first_index:]
 
 
-def _bound_roots(a: Sequence[Any], y: Any, coefficients: Sequence[Any]) -> float:
-    """A bound on the size of the roots. Terms in y do not cancel, so it is positive even if all roots are 0."""
+def _measure_roots(a: Sequence[Any], y: Any, coefficients: Sequence[Any]) -> float:
+    """A size of the roots: the largest |aₖ/a0|^(1/k). No root is larger than twice this size.
+
+    The absolute values of the terms in y are added, so the size is positive even if all roots are 0.
+    """
     terms = [flint.fmpq_poly([*map(abs, c.coeffs())])(abs(y)) for c in a[len(a) - len(coefficients) :]]
-    lead = abs(coefficients[0])
-    ratios = ((k, t / lead) for k, t in enumerate(terms) if k and t != 0)
+    leading_size = abs(coefficients[0])
+    ratios = ((k, t / leading_size) for k, t in enumerate(terms) if k and t != 0)
     return max((float((flint.arb(ratio) ** (flint.arb(1) / k)).mid()) for k, ratio in ratios), default=1.0)
 
 
@@ -277,9 +279,9 @@ def _classify(coefficients: Sequence[Any]) -> tuple[bool, bool]:
     return True, all(r.im == 0 for r in exact_roots(coefficients))
 
 
-def _list_cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tuple[float, float, Any]]:
-    """The intervals between marks: both ends, and a number between them."""
-    for low, high in pairwise([lower, *marks, upper]):
+def _list_cells(critical_values: Sequence[Any], lower: Any, upper: Any | None) -> Iterator[tuple[float, float, Any]]:
+    """The intervals between critical values: the two ends, and a number between them."""
+    for low, high in pairwise([lower, *critical_values, upper]):
         if high is None:
             yield float(low), math.inf, low + 1 + abs(low)
         else:
@@ -287,11 +289,11 @@ def _list_cells(marks: Sequence[Any], lower: Any, upper: Any | None) -> Iterator
 
 
 def _merge_bands(cells: Sequence[tuple[float, float, Any]], is_inside: Sequence[bool]) -> tuple[Stretch, ...]:
-    """The intervals that are inside. Adjacent ones are merged, even if the single point between them is not inside."""
+    """The intervals that are inside. Adjacent intervals are merged, even if the point between them is not inside."""
     bands: list[Stretch] = []
-    for (low, high, _), holds in zip(cells, is_inside, strict=True):
-        if holds and bands and bands[-1][1] == low:
+    for (low, high, _), is_cell_inside in zip(cells, is_inside, strict=True):
+        if is_cell_inside and bands and bands[-1][1] == low:
             bands[-1] = (bands[-1][0], high)
-        elif holds:
+        elif is_cell_inside:
             bands.append((low, high))
     return tuple(bands)

@@ -12,13 +12,13 @@ from tmsopt.errors import Fault, InputError, count_faults, is_number, short, sug
 from tmsopt.problem.units import parse_quantity
 from tmsopt.records import Array, Table, plain
 
-MOST_POINTS = 1_000_000
-"""Most points of a simulation."""
+MAX_POINTS = 1_000_000
+"""Largest number of points of a simulation."""
 
 _DEFAULT_LEAN = math.pi / 180  # lean at the start if the user states no disturbance
-_ANGLE_NAMES = dict(zip(("lean", "steer"), ANGLES, strict=True))
-_IMPULSES = {"push": "T_delta", "lean_push": "T_phi"}
-_AMOUNTS = (*_IMPULSES, "noise")
+_ANGLE_NAMES = dict(zip(("lean", "steer"), ANGLES, strict=True))  # argument → name of the state
+_IMPULSES = {"push": "T_delta", "lean_push": "T_phi"}  # argument → name of the torque
+_AMOUNTS = (*_IMPULSES, "noise")  # arguments that are a number without a choice of units
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,9 @@ def parse_disturbance(system: System, arguments: Mapping[str, Any]) -> Disturban
     """
     start, faults = _parse_angles(system, arguments)
     states = {} if arguments["start"] is None else arguments["start"]
-    wrong = table_faults("start", states, f"{{'{system.names[-1]}': 0.1}}")
-    faults += wrong
-    for name, value in () if wrong else states.items():
+    start_faults = table_faults("start", states, f"{{'{system.names[-1]}': 0.1}}")
+    faults += start_faults
+    for name, value in () if start_faults else states.items():
         if name not in system.names:
             faults.append(Fault(f"unknown state '{name}'; {suggest(name, system.names)}", ("start",)))
         elif not is_number(value):
@@ -80,36 +80,36 @@ def parse_disturbance(system: System, arguments: Mapping[str, Any]) -> Disturban
     if seconds is not None and not (is_number(seconds) and seconds > 0):
         faults.append(Fault(f"found {short(seconds)}; accepted: a number above 0", ("seconds",)))
     faults += [
-        *count_faults("points", arguments["points"], 2, MOST_POINTS),
+        *count_faults("points", arguments["points"], 2, MAX_POINTS),
         *count_faults("seed", arguments["seed"], 0),
     ]
     if faults:
         raise InputError(faults)
-    nothing = not start and all(arguments[name] is None for name in _AMOUNTS)
-    if nothing:
+    is_default = not start and all(arguments[name] is None for name in _AMOUNTS)
+    if is_default:
         start = {system.coordinates[0]: _DEFAULT_LEAN if system.impulses else 1.0}
     amounts = {name: float(arguments[name] or 0.0) for name in _AMOUNTS}
-    return Disturbance(Table(start), **amounts, seed=int(arguments["seed"]), default=nothing)
+    return Disturbance(Table(start), **amounts, seed=int(arguments["seed"]), default=is_default)
 
 
 def _parse_angles(system: System, arguments: Mapping[str, Any]) -> tuple[dict[str, float], list[Fault]]:
     """The angles at the start, and the faults of the angles, pushes and noise."""
     faults, start = list[Fault](), dict[str, float]()
-    for word, value in ((w, arguments[w]) for w in (*_ANGLE_NAMES, *_AMOUNTS) if arguments[w] is not None):
+    for argument, value in ((w, arguments[w]) for w in (*_ANGLE_NAMES, *_AMOUNTS) if arguments[w] is not None):
         if not system.impulses:
             example = ", ".join(f"{n}=1" for n in system.names[-1:])
             message = f"a stated system has no lean and no steer; give its initial state, start (--start) {example}"
-            faults.append(Fault(message, (word,)))
-        elif word in _ANGLE_NAMES and isinstance(value, str):
+            faults.append(Fault(message, (argument,)))
+        elif argument in _ANGLE_NAMES and isinstance(value, str):
             try:
-                start[_ANGLE_NAMES[word]] = parse_quantity(value, "rad")
+                start[_ANGLE_NAMES[argument]] = parse_quantity(value, "rad")
             except ValueError as error:
                 text = str(error).replace("a number without quotes in rad", "a number without quotes in degrees")
-                faults.append(Fault(text, (word,)))
+                faults.append(Fault(text, (argument,)))
         elif not is_number(value):
-            faults.append(Fault(f"found {short(value)}; accepted: a number", (word,)))
-        elif word in _ANGLE_NAMES:
-            start[_ANGLE_NAMES[word]] = math.radians(value)
-        elif word == "noise" and value < 0:
-            faults.append(Fault(f"found {value:.6g}; accepted: 0 or more", (word,)))
+            faults.append(Fault(f"found {short(value)}; accepted: a number", (argument,)))
+        elif argument in _ANGLE_NAMES:
+            start[_ANGLE_NAMES[argument]] = math.radians(value)
+        elif argument == "noise" and value < 0:
+            faults.append(Fault(f"found {value:.6g}; accepted: 0 or more", (argument,)))
     return start, faults

@@ -12,10 +12,10 @@ from tmsopt.records import Array
 def sample_motion(A: Array, x: Array, step: float, count: int) -> Array:
     """e^(A k h) x for k = 0 … count − 1, shape (count, n), by one exponential and its squares."""
     states = np.asarray(x, dtype=float)[None]
-    power = expm(A * step)
+    exponential = expm(A * step)
     while len(states) < count:
-        states = np.concatenate([states, states @ power.T])
-        power = power @ power
+        states = np.concatenate([states, states @ exponential.T])
+        exponential = exponential @ exponential
     return states[:count]
 
 
@@ -35,16 +35,16 @@ def simulate_noise(A: Array, x: Array, force: Array, step: float, count: int, se
     n = len(A)
     halvings = max(0, math.ceil(math.log2(np.linalg.norm(A, 2) * step + 1e-300)))
     matrix = np.block([[-A, np.outer(force, force)], [np.zeros((n, n)), A.T]])
-    power = expm(matrix * (step / 2**halvings))
-    forward = power[n:, n:].T
-    covariance = forward @ power[:n, n:]
+    exponential = expm(matrix * (step / 2**halvings))
+    propagator = exponential[n:, n:].T
+    covariance = propagator @ exponential[:n, n:]
     for _ in range(halvings):
-        covariance = covariance + forward @ covariance @ forward.T
-        forward = forward @ forward
-    sizes, axes = np.linalg.eigh((covariance + covariance.T) / 2)
-    root = axes * np.sqrt(np.maximum(sizes, 0.0))
-    steps = np.random.default_rng(seed).standard_normal((count - 1, n)) @ root.T
-    return np.array([*accumulate(steps, lambda state, jump: forward @ state + jump, initial=x)])
+        covariance = covariance + propagator @ covariance @ propagator.T
+        propagator = propagator @ propagator
+    variances, axes = np.linalg.eigh((covariance + covariance.T) / 2)
+    square_root = axes * np.sqrt(np.maximum(variances, 0.0))
+    steps = np.random.default_rng(seed).standard_normal((count - 1, n)) @ square_root.T
+    return np.array([*accumulate(steps, lambda state, jump: propagator @ state + jump, initial=x)])
 
 
 def stationary_covariance(A: Array, force: Array) -> Array:

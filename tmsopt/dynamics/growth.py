@@ -27,11 +27,12 @@ SPEEDS = ("Fr", "v")
 """Parameters that are speeds."""
 
 _BICYCLE_DEGREE = 4  # degree of a bicycle whose modes have names
-_GRID_POINTS = 801  # evenly spaced points
-_HALVINGS = 60  # halvings of a step of the grid, until only rounding errors remain
-_DENSE_OFFSETS = np.linspace(-1, 1, 301) ** 5  # of points around a meeting of roots, in widths of the range
+_GRID_POINTS = 801  # number of evenly spaced values of the parameter
+_HALVINGS = 60  # number of halvings of a step of the grid, until only rounding errors remain
+_DENSE_OFFSETS = np.linspace(-1, 1, 301) ** 5
+"""Offsets of additional values from a meeting of roots, in widths of the range."""
 _END_RATIO = 1.25  # end of the range relative to the last event
-_FAR_RATIO = 3  # farthest meeting of roots that is shown, relative to the design and the last axis crossing
+_FAR_RATIO = 3  # farthest meeting of roots that is shown, relative to the design or the last axis crossing
 
 
 @dataclass(frozen=True, repr=False)
@@ -129,15 +130,15 @@ def growth(
     has_critical = f"{name}_c" in model.quantity_names(parameter_set)
     design_value = parameters[name]
     critical = float(Values(model, parameter_set, parameters)[f"{name}_c"]) if has_critical else math.nan
-    speed = name in SPEEDS
+    is_speed = name in SPEEDS
     low, high = _choose_range(design, name, end, design_value)
 
     def coefficients(x: Array) -> Array:
-        """Of shape (n, degree + 1)."""
+        """Coefficients at values x of the parameter, shape (n, degree + 1)."""
         a = model.coefficients({**parameters, name: x}, parameter_set)
         return np.stack(np.broadcast_arrays(*a, x)[:-1], axis=-1).astype(float)
 
-    is_open, is_polynomial = speed and end is None, True
+    is_open, is_polynomial = is_speed and end is None, True
     try:
         a = coefficients_over(design.problem.posed, parameter_set, parameters, name)
         crossings = find_crossings(a, low, math.inf if is_open else high)
@@ -151,15 +152,17 @@ def growth(
         high = _choose_end(crossings.found, design_value)
     events = tuple(c for c in crossings.found if low < c.at < high)
     centres = [design_value, *(c.at for c in events if "EP" in c.kind)]
-    first = low + (high - low) / _GRID_POINTS if speed else low  # at rest a speed leaves roots 0
+    grid_start = low + (high - low) / _GRID_POINTS if is_speed else low  # at speed 0, roots are 0
     grid = np.unique(
-        np.concatenate([np.linspace(first, high, _GRID_POINTS), *(c + _DENSE_OFFSETS * (high - low) for c in centres)])
+        np.concatenate(
+            [np.linspace(grid_start, high, _GRID_POINTS), *(c + _DENSE_OFFSETS * (high - low) for c in centres)]
+        )
     )
-    values = grid[(grid > low if speed else grid >= low) & (grid <= high)]
+    values = grid[(grid > low if is_speed else grid >= low) & (grid <= high)]
 
     c = coefficients(values)
-    finite = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # neither a pole nor a root at infinity
-    values, c = values[finite], c[finite]
+    is_finite = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # leave out poles and roots at infinity
+    values, c = values[is_finite], c[is_finite]
     root_values = roots(c)
     if is_polynomial:
         stable, heavily_damped = (
@@ -183,7 +186,7 @@ def growth(
         design_value,
         multiple_meetings,
         is_bicycle=is_bicycle(model) and model.degree == _BICYCLE_DEGREE,
-        over_speed=speed,
+        over_speed=is_speed,
     )
     if model.carrier is not None:
         root_values = user_root_array(model, root_values)
@@ -234,8 +237,8 @@ def _choose_end(crossings: Sequence[Crossing], design_value: float) -> float:
     """The end of a range of speeds that shows all events."""
     last_crossing = max((c.at for c in crossings if c.kind in ("weave", "capsize", "infinity")), default=0.0)
     shown_end = _FAR_RATIO * max(design_value, last_crossing, 0.5)
-    last = max((c.at for c in crossings if c.at <= shown_end), default=0.0)
-    return _END_RATIO * max(last, last_crossing, design_value) if last else 2 * max(design_value, 0.5)
+    last_event = max((c.at for c in crossings if c.at <= shown_end), default=0.0)
+    return _END_RATIO * max(last_event, last_crossing, design_value) if last_event else 2 * max(design_value, 0.5)
 
 
 def _clip_bands(bands: Sequence[Stretch], low: float, high: float) -> tuple[Stretch, ...]:
@@ -256,17 +259,17 @@ def _find_stability_changes(coefficients: Callable[[Array], Array], grid: Array)
         middle = (low + high) / 2
         on_low_side = is_stable(coefficients(middle)) == is_inside[k]
         low, high = np.where(on_low_side, middle, low), np.where(on_low_side, high, middle)
-    for at, a in zip(high.tolist(), coefficients(high), strict=True):
+    for value, a in zip(high.tolist(), coefficients(high), strict=True):
         if np.all(np.isfinite(a)) and a[0] != 0:  # nothing crosses the axis at a pole or with a root at infinity
             omega = abs(min(roots(a).tolist(), key=lambda z: abs(z.real)).imag)
-            yield Crossing(at, "weave" if omega else "capsize", Root(0.0, omega), rightmost=True, changes=True)
+            yield Crossing(value, "weave" if omega else "capsize", Root(0.0, omega), rightmost=True, changes=True)
 
 
 def _find_runs(values: Array, is_inside: Truth, events: Sequence[Crossing]) -> Iterator[Stretch]:
-    """First and last value of each run of points inside, extended to an event before the next point outside."""
+    """First and last value of each run of points inside, extended to an event between it and the next point outside."""
     changes = np.flatnonzero(np.diff(is_inside.astype(int), prepend=0, append=0))
     padded = np.concatenate([values[:1], values, values[-1:]])
-    for k, m in changes.reshape(-1, 2):
-        begins = [c.at for c in events if padded[k] <= c.at <= values[k]]
-        ends = [c.at for c in events if values[m - 1] <= c.at <= padded[m + 1]]
-        yield float(max(begins, default=values[k])), float(min(ends, default=values[m - 1]))
+    for start, stop in changes.reshape(-1, 2):
+        begins = [c.at for c in events if padded[start] <= c.at <= values[start]]
+        ends = [c.at for c in events if values[stop - 1] <= c.at <= padded[stop + 1]]
+        yield float(max(begins, default=values[start])), float(min(ends, default=values[stop - 1]))

@@ -28,8 +28,9 @@ class ModeShape:
         geometric: number of independent shapes; 1 if all shapes have merged.
         partial: lengths of the Jordan chains, longest first; a chain of length k has motions up to t^(k−1) e^(st).
         amplitudes: amplitude of each coordinate; the largest amplitude is 1.
-        phases: phase lead over the first coordinate (lean) in degrees, from −180 to 180; nan for a coordinate at rest.
-            For a complex H the argument of ψₖ/ψ₁, with motion as e^(−iωt).
+        phases: by how many degrees a coordinate is ahead of the first coordinate (lean), from −180 to 180; nan for a
+            coordinate at rest.
+            For a complex H, it is the argument of ψₖ/ψ₁, for a motion proportional to e^(−iωt).
         eigenfrequency: ω = i s for a complex H, otherwise None.
     """
 
@@ -57,21 +58,21 @@ class ModeShape:
 
 
 def compute_mode_shapes(
-    problem: Posed, parameters: Mapping[str, float], structure: Structure, rate: float
+    problem: Posed, parameters: Mapping[str, float], structure: Structure, rate_unit: float
 ) -> tuple[ModeShape, ...]:
     """Mode shapes at every root of a design, rightmost first: null vectors of its matrices at the root.
 
-    They are the right singular vectors of L(s) with the smallest singular values; L(s) = s + i H for a complex H.
-    The roots s are those of the ideal design, because rounding separates multiple roots of the stored design.
+    The null vectors are the right singular vectors of L(s) with the smallest singular values. For a complex H, L(s) is
+    s + i H. The roots s are the roots before rounding, because rounding to double precision separates multiple roots.
 
     Args:
-        rate: the unit of rates in 1/s.
+        rate_unit: the unit of rates in 1/s.
     """
     model, parameter_set = problem.model, problem.parameter_set
     pencil = matrices_of(model)(parameter_set.native(parameters))
     names = coordinates_of(model, pencil)
-    chains = diagnose_roots(model, parameter_set, parameters, structure)
-    if model.double is not None:  # −[[J, R], [−R, J]]
+    diagnoses = diagnose_roots(model, parameter_set, parameters, structure)
+    if model.double is not None:  # a complex H = R + iJ has the real matrix −[[J, R], [−R, J]]
         n = len(names)
         pencil = [np.eye(n), pencil[1][:n, :n] - 1j * pencil[1][:n, n:]]
     roots = [r for r in user_roots(model, structure.roots) if model.double or r.im >= 0]
@@ -79,16 +80,16 @@ def compute_mode_shapes(
     partial: tuple[int, ...]
     for root in sorted(roots, key=lambda r: (-r.re, -r.im)):
         s, geometric, partial = complex(root.re, root.im), 1, (1,)
-        chain = min(chains, key=lambda d: abs(complex(d.re, d.im) - s), default=None)
-        if root.multiplicity > 1 and chain is not None:
-            s, geometric, partial = complex(chain.re, chain.im), chain.geometric, chain.partial
+        diagnosis = min(diagnoses, key=lambda d: abs(complex(d.re, d.im) - s), default=None)
+        if root.multiplicity > 1 and diagnosis is not None:
+            s, geometric, partial = complex(diagnosis.re, diagnosis.im), diagnosis.geometric, diagnosis.partial
         vectors = _compute_null_vectors(pencil, s, geometric)
         omega = next((complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag)])), None)
         for vector in vectors:
             columns = _normalise_shape(vector[: len(names)])
-            sizes, turns = (Table(dict(zip(names, column, strict=True))) for column in columns)
-            at = rate * s.real, rate * s.imag
-            shapes.append(ModeShape(*at, root.multiplicity, len(vectors), partial, sizes, turns, omega))
+            amplitudes, phases = (Table(dict(zip(names, column, strict=True))) for column in columns)
+            re, im = rate_unit * s.real, rate_unit * s.imag
+            shapes.append(ModeShape(re, im, root.multiplicity, len(vectors), partial, amplitudes, phases, omega))
     return tuple(shapes)
 
 
@@ -97,9 +98,9 @@ def _compute_null_vectors(pencil: Sequence[Any], s: complex, count: int) -> Comp
     powers = [s ** (len(pencil) - 1 - k) for k in range(len(pencil))]
     L = sum(z * P for z, P in zip(powers, pencil, strict=True))
     size = sum(abs(z) * np.abs(P) for z, P in zip(powers, pencil, strict=True))
-    rows = 1 / _replace_zeros(size.max(axis=1, keepdims=True))
-    columns = 1 / _replace_zeros((rows * size).max(axis=0))
-    vectors: Complex = np.linalg.svd(rows * L * columns)[2][-count:].conj() * columns
+    row_scales = 1 / _replace_zeros(size.max(axis=1, keepdims=True))
+    column_scales = 1 / _replace_zeros((row_scales * size).max(axis=0))
+    vectors: Complex = np.linalg.svd(row_scales * L * column_scales)[2][-count:].conj() * column_scales
     return vectors
 
 
@@ -111,6 +112,6 @@ def _normalise_shape(vector: Complex) -> tuple[list[float], list[float]]:
     """Amplitudes and phases; the first coordinate that moves has phase 0."""
     sizes = np.abs(vector) / np.abs(vector).max()
     is_moving = sizes > _ZERO_AMPLITUDE
-    rotated = vector / vector[int(np.argmax(is_moving))]
-    rounded = np.where(np.abs(rotated.imag) > _ZERO_AMPLITUDE * np.abs(rotated), rotated, rotated.real)
-    return np.where(is_moving, sizes, 0.0).tolist(), np.where(is_moving, np.degrees(np.angle(rounded)), np.nan).tolist()
+    z = vector / vector[int(np.argmax(is_moving))]
+    phases = np.degrees(np.angle(np.where(np.abs(z.imag) > _ZERO_AMPLITUDE * np.abs(z), z, z.real)))
+    return np.where(is_moving, sizes, 0.0).tolist(), np.where(is_moving, phases, np.nan).tolist()

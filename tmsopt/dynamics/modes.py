@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from tmsopt.records import Array, Complex
 
-_MIN_POINTS, _MIN_SHARE = 3, 1e-4
-"""Least number of points and least share of all values of a `_Piece`; smaller pieces are rounding errors."""
-# two roots meet without a third if their distance is at most this share of the distance to the third
+_MIN_POINTS = 3  # smallest number of points of a `_Piece`; smaller pieces are rounding errors
+_MIN_SHARE = 1e-4  # smallest length of a `_Piece`, as a share of the range of values
 _ISOLATED_RATIO = 0.5
+"""Two roots meet without a third if their distance is at most this share of the distance to the third root."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ def follow_modes(
     A root keeps its name where other roots meet. For a bicycle, the naming starts from a piece with one pair and
     two real roots: the piece of the design or, if the parameter is the speed, the piece with the highest speeds.
     The pair is weave, the left real root castering, the right real root capsize. If there is no such piece, the
-    rightmost pair is weave. For other models, roots are numbered from right to left at the design. A pair that two
-    real roots form has both their names. Where more than two roots meet, as at EP3 and EP4, new names begin.
+    rightmost pair is weave. For other models, roots are numbered from right to left at the design. A pair that forms
+    from two real roots has both names. Where more than two roots meet, as at EP3 and EP4, new names begin.
 
     Args:
         values: values of the parameter, ascending, shape (n,).
@@ -58,46 +58,48 @@ def follow_modes(
         is_bicycle: whether modes have the names of a bicycle.
         over_speed: whether the parameter is the speed.
     """
-    parts = _split_pieces(values, roots, multiple_meetings)
-    if not parts:
+    pieces = _split_pieces(values, roots, multiple_meetings)
+    if not pieces:
         return ()
     typical_pieces = [
-        k for k, part in enumerate(parts) if is_bicycle and part.roots.shape[1] == 3 and part.real_count == 2
+        k for k, piece in enumerate(pieces) if is_bicycle and piece.roots.shape[1] == 3 and piece.real_count == 2
     ]
-    design_piece = min(range(len(parts)), key=lambda k: (np.abs(parts[k].values - design).min(), -len(parts[k].values)))
-    first = (
+    design_piece = min(
+        range(len(pieces)), key=lambda k: (np.abs(pieces[k].values - design).min(), -len(pieces[k].values))
+    )
+    first_piece = (
         design_piece
         if not typical_pieces or (not over_speed and design_piece in typical_pieces)
         else typical_pieces[-1]
     )
-    names = {first: _name_modes(parts[first], design, is_bicycle)}
-    for order in (range(first, len(parts)), range(first, -1, -1)):
-        for previous, k in pairwise(order):
-            new_names = _pass_names(parts[previous], names[previous], parts[k], forward=k > previous)
+    names = {first_piece: _name_modes(pieces[first_piece], design, is_bicycle)}
+    for indices in (range(first_piece, len(pieces)), range(first_piece, -1, -1)):
+        for previous, k in pairwise(indices):
+            new_names = _pass_names(pieces[previous], names[previous], pieces[k], forward=k > previous)
             is_mixed = is_bicycle and any("weave +" in name or "+ weave" in name for name in new_names)
-            names[k] = new_names if new_names and not is_mixed else _name_modes(parts[k], design, is_bicycle)
+            names[k] = new_names if new_names and not is_mixed else _name_modes(pieces[k], design, is_bicycle)
     return tuple(
-        Mode(name, part.values, column)
-        for k, part in enumerate(parts)
-        for name, column in zip(names[k], part.roots.T, strict=True)
+        Mode(name, piece.values, column)
+        for k, piece in enumerate(pieces)
+        for name, column in zip(names[k], piece.roots.T, strict=True)
     )
 
 
 def _split_pieces(values: Array, roots: Complex, multiple_meetings: Sequence[float]) -> list[_Piece]:
-    real = np.count_nonzero(roots.imag == 0, axis=1)
-    cuts = np.union1d(np.flatnonzero(np.diff(real)) + 1, np.searchsorted(values, multiple_meetings))
-    parts = []
+    real_counts = np.count_nonzero(roots.imag == 0, axis=1)
+    cuts = np.union1d(np.flatnonzero(np.diff(real_counts)) + 1, np.searchsorted(values, multiple_meetings))
+    pieces = []
     for rows in np.split(np.arange(len(values)), cuts):
         if len(rows) < _MIN_POINTS or np.ptp(values[rows]) < _MIN_SHARE * np.ptp(values):
             continue
-        piece_roots, count = roots[rows], int(real[rows[0]])
+        piece_roots, count = roots[rows], int(real_counts[rows[0]])
         reals = np.sort(piece_roots.real[piece_roots.imag == 0].reshape(len(rows), count), axis=1)
         pairs = np.sort_complex(piece_roots[piece_roots.imag > 0].reshape(len(rows), -1))
         for k in range(1, len(rows)) if pairs.shape[1] > 1 else ():
             predicted = 2 * pairs[k - 1] - pairs[k - 2] if k > 1 else pairs[k - 1]
             pairs[k] = pairs[k][_match_roots(predicted, pairs[k])]
-        parts.append(_Piece(values[rows], np.concatenate([reals, pairs], axis=1), count))
-    return parts
+        pieces.append(_Piece(values[rows], np.concatenate([reals, pairs], axis=1), count))
+    return pieces
 
 
 def _match_roots(a: Complex, b: Complex) -> NDArray[np.intp]:
@@ -111,26 +113,26 @@ def _match_roots(a: Complex, b: Complex) -> NDArray[np.intp]:
     return linear_sum_assignment(squares)[1]
 
 
-def _name_modes(part: _Piece, design: float, is_bicycle: bool) -> list[str]:
+def _name_modes(piece: _Piece, design: float, is_bicycle: bool) -> list[str]:
     """Names of the modes of a bicycle, or numbers from right to left at the value nearest to the design."""
-    count, row = part.real_count, part.roots[np.abs(part.values - design).argmin()]
+    count, row = piece.real_count, piece.roots[np.abs(piece.values - design).argmin()]
     pairs = len(row) - count
     if is_bicycle and (count, pairs) == (2, 1):
         return ["castering", "capsize", "weave"]
     if is_bicycle and (count, pairs) == (0, 2):
-        rightmost = part.roots.real.max(axis=0).argmax()
+        rightmost = piece.roots.real.max(axis=0).argmax()
         return ["weave" if k == rightmost else "second pair" for k in range(2)]
     rank = np.argsort(np.argsort(-row[count:].real)) + 1
     return [f"real {count - k}" for k in range(count)] + [f"pair {k}" for k in rank]
 
 
 def _pass_names(old_piece: _Piece, names: list[str], new_piece: _Piece, forward: bool) -> list[str]:
-    """Names of the next piece, from the names of the previous piece; empty unless just two roots meet between them."""
+    """Names of the next piece from the names of the previous one; empty unless exactly two roots meet between them."""
     if abs(old_piece.real_count - new_piece.real_count) != 2:
         return []
     few_reals, many_reals = sorted((old_piece, new_piece), key=lambda piece: piece.real_count)
     # roots next to the meeting: r on the side where the two are real, p on the side where they are a pair
-    r, p = (part.roots[-1 if (part is old_piece) == forward else 0] for part in (many_reals, few_reals))
+    r, p = (piece.roots[-1 if (piece is old_piece) == forward else 0] for piece in (many_reals, few_reals))
     i = int(np.diff(r[: many_reals.real_count].real).argmin())  # real roots i and i + 1 form the pair j
     j = few_reals.real_count + int(p[few_reals.real_count :].imag.argmin())
     other_reals, other_roots = np.delete(np.arange(len(r)), [i, i + 1]), np.delete(np.arange(len(p)), j)

@@ -11,7 +11,14 @@ import numpy as np
 from tmsopt.boundaries.weighted_design import parameter_faults
 from tmsopt.dynamics.disturbance import Disturbance, parse_disturbance
 from tmsopt.dynamics.flow import sample_motion, simulate_noise, stationary_covariance
-from tmsopt.dynamics.measures import FINEST, MOST, Measure, SampledMotion, measure_output, sample_grid
+from tmsopt.dynamics.measures import (
+    MAX_GRID_POINTS,
+    POINTS_PER_PERIOD,
+    Measure,
+    SampledMotion,
+    measure_output,
+    sample_grid,
+)
 from tmsopt.dynamics.mode_shapes import ModeShape, compute_mode_shapes
 from tmsopt.dynamics.speeds import parameters_of
 from tmsopt.dynamics.system import ANGLES, RATES, System, matrices_of, system_of
@@ -24,12 +31,16 @@ from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Column, Table, Tabular, plain
 from tmsopt.roots import Structure
 
-_DECAYS, _GROWTHS, _RADIANS = 10.0, 3.0, 200.0  # durations in units of 1/|abscissa| (twice) and 1/|s|
-_DOUBLINGS = 8  # most doublings of the duration
-_STILL_RATIO = 0.002  # largest share of the peak in the second half of a long enough duration
-_NO_GROWTH, _ROUNDING = 1e-9, 1e-12  # growth and decay, relative to the largest root, that are not significant
-_MIN_DECAY = _DECAYS * FINEST / (2 * math.pi * MOST)  # decay, relative to the fastest root, too slow for the grid
-_DRIFT = 10.0  # duration in units of 1/‖A‖ if all roots are 0
+_DECAY_DURATION = 10.0  # first duration for a stable design, in units of 1/|abscissa|
+_GROWTH_DURATION = 3.0  # longest duration for an unstable design, in units of 1/abscissa
+_MAX_RADIANS = 200.0  # longest duration for an unstable design, in units of 1/|s| of the largest root s
+_MAX_DOUBLINGS = 8  # largest number of doublings of the duration
+_STILL_RATIO = 0.002  # a duration is long enough if its second half stays below this share of the peak
+_NO_GROWTH = 1e-9  # largest growth rate, relative to the largest root, that is not significant
+_ROUNDING = 1e-12  # rounding error of a root, relative to the largest root
+# smallest decay rate, relative to the fastest root, for which the grid is long enough
+_MIN_DECAY = _DECAY_DURATION * POINTS_PER_PERIOD / (2 * math.pi * MAX_GRID_POINTS)
+_DRIFT_DURATION = 10.0  # duration in units of 1/‖A‖ if all roots are 0
 _SETTLED_RATIO = 1.2  # duration relative to the settling time
 _MAX_EXPONENT = 600.0  # largest growth as an exponent of e
 
@@ -39,8 +50,8 @@ class Simulation(Tabular):
     """Motion of a design over time.
 
     Attributes:
-        parameters: every parameter of the design, as stored.
-        disturbance: the disturbance that set it moving.
+        parameters: every parameter of the design, in double precision.
+        disturbance: the disturbance that starts the motion.
         columns: ``t``, then for a bicycle ``phi delta phidot deltadot``, the torques ``T_phi`` and ``T_delta`` of a
             controller, and the path: ``x`` along the road, yaw ``psi``, and the positions ``y_rear`` and ``y_front`` of
             the contacts, positive to the right. A stated system has ``q1 … q1dot …`` or ``x1 …``, and a complex H has
@@ -129,10 +140,10 @@ def simulate(
 ) -> Simulation:
     """Simulate a design after a lean, a push of its handlebar or in noise; exact even where its roots meet.
 
-    The motion is x(t) = e^(At) x(0) for the linear equations of the stored design, at evenly spaced times. At a
-    multiple root with a Jordan block the exponential contains the terms t^k e^(st). Rounding moves the roots of an
-    exceptional point, but changes e^(At) only by the size of the rounding. Peaks and settling times belong to the exact
-    motion, not to the times shown.
+    The motion is x(t) = e^(At) x(0) at evenly spaced times, for the linear equations of the design with its
+    parameters in double precision. At a multiple root with a Jordan block, the exponential contains the terms
+    t^k e^(st). Rounding moves the roots of an exceptional point, but changes e^(At) only by the size of the rounding.
+    Peaks and settling times belong to the exact motion, not to the times shown.
 
     Args:
         design: a solution, or a problem or its file, which is solved first if it has free parameters.
@@ -145,8 +156,9 @@ def simulate(
         noise: intensity σ of white noise on the steer torque, in N m √s; its impulse over a time T has the standard
             deviation σ √T.
         seed: seed of the noise.
-        seconds: duration, for dimensionless parameters in √(w/g). The default for a stable design is until all outputs
-            have settled, and for an unstable design until it has grown by e³, or 200/|s| of its largest root s.
+        seconds: duration, for dimensionless parameters in √(w/g). By default, a stable design is shown until all
+            outputs have settled, and an unstable design until its motion has grown by e³. If this takes longer than
+            200/|s|, where s is the largest root, an unstable design is shown for 200/|s|.
         points: number of evenly spaced times, including 0 and the end.
         at: parameters that have other values than in the design, such as the speed: ``{"v": 1.5}``. If the problem has
             several scenarios, the nominal design is simulated.
@@ -166,7 +178,7 @@ def simulate(
     """
     arguments, posed = locals(), pose(design)
     problem = posed.nominal
-    matrices_of(problem.model)
+    matrices_of(problem.model)  # without matrices, raise an error before the problem is solved
     parameters = problem.ordered(parameters_of(design, posed, "", progress)) | dict(at or {})
     if faults := list(parameter_faults(problem, parameters)):
         raise InputError([replace(f, key=("at", *f.key[-1:])) for f in faults])
@@ -176,26 +188,26 @@ def simulate(
     model_structure: Structure = problem.values(parameters)["structure"]
     structure = user_structure(problem.model, model_structure)
     parameter_set = problem.parameter_set
-    rate = 1.0 if parameter_set.rate is None else float(parameter_set.rate(parameters))
+    rate_unit = 1.0 if parameter_set.rate is None else float(parameter_set.rate(parameters))
     x = disturbance.state(system)
-    stable = _is_stable(problem, model_structure)
-    decays, end_time, motion = _choose_duration(system, x, structure, stable, rate, seconds, bool(noise))
+    is_stable = _is_stable(problem, model_structure)
+    has_died_out, end_time, motion = _choose_duration(system, x, structure, is_stable, rate_unit, seconds, bool(noise))
     times, step = np.linspace(0.0, end_time, points), end_time / (points - 1)
-    watched, deviations = {n: system.rows[n] for n in (*system.coordinates, *system.torques)}, Table[float]()
+    output_rows, deviations = {n: system.rows[n] for n in (*system.coordinates, *system.torques)}, Table[float]()
     if noise:
         force = disturbance.noise * system.impulses["T_delta"]
         states = simulate_noise(system.A, x, force, step, points, seed)
-        measures = tuple(_find_peak(name, times, states @ row) for name, row in watched.items())
-        deviations = _compute_deviations(system, force) if stable else deviations
+        measures = tuple(_find_peak(name, times, states @ row) for name, row in output_rows.items())
+        deviations = _compute_deviations(system, force) if is_stable else deviations
     else:
         states = sample_motion(system.A, x, step, points)
-        measures = tuple(measure_output(name, row, motion, decays) for name, row in watched.items())
-    base = tuple(n for n in system.names if n not in system.torques)
-    extra_names = tuple(n for n in system.rows if n not in base)
-    columns = {"t": Column(times)} | {n: Column(states @ system.rows[n]) for n in (*base, *extra_names)}
+        measures = tuple(measure_output(name, row, motion, has_died_out) for name, row in output_rows.items())
+    base_names = tuple(n for n in system.names if n not in system.torques)
+    extra_names = tuple(n for n in system.rows if n not in base_names)
+    columns = {"t": Column(times)} | {n: Column(states @ system.rows[n]) for n in (*base_names, *extra_names)}
     if extra_names:
         columns["x"], extra_names = Column(system.speed * times), (*extra_names, "x")
-    modes = compute_mode_shapes(problem, parameters, model_structure, rate)
+    modes = compute_mode_shapes(problem, parameters, model_structure, rate_unit)
     units = Table({n: system.units[n] for n in columns if n in system.units})
     return Simulation(
         problem.problem,
@@ -207,23 +219,33 @@ def simulate(
         deviations,
         modes,
         structure.name,
-        stable,
+        is_stable,
         extra_names,
     )
 
 
 def _is_stable(problem: Posed, structure: Structure) -> bool:
-    """Whether the design is stable; multiple roots, and roots of a complex H, by more than rounding errors."""
-    rightmost = [r.multiplicity for r in structure.roots if r.re == structure.abscissa]
-    exact = problem.model.carrier is None and max(rightmost, default=1) == 1
-    largest = max((r.size for r in structure.roots), default=0.0)
-    return structure.abscissa < (0.0 if exact else -_ROUNDING * largest)
+    """Whether the design is stable. Multiple roots, and roots of a complex H, must be stable by more than rounding."""
+    rightmost_multiplicities = [r.multiplicity for r in structure.roots if r.re == structure.abscissa]
+    is_complex = problem.model.carrier is not None  # only a complex H has a carrier, a shift of its eigenfrequencies
+    is_exact = not is_complex and max(rightmost_multiplicities, default=1) == 1
+    max_root_size = max((r.size for r in structure.roots), default=0.0)
+    return structure.abscissa < (0.0 if is_exact else -_ROUNDING * max_root_size)
 
 
 def _choose_duration(
-    system: System, x: Array, structure: Structure, stable: bool, rate: float, seconds: float | None, noisy: bool
+    system: System,
+    x: Array,
+    structure: Structure,
+    is_stable: bool,
+    rate_unit: float,
+    seconds: float | None,
+    has_noise: bool,
 ) -> tuple[bool, float, SampledMotion]:
-    """Whether the sampled motion decays to its end, the time to show, and the sampled motion.
+    """Choose how long to sample and to show a motion.
+
+    Returns three things: whether the motion has died out when the samples end, the time to show, and the sampled
+    motion.
 
     Raises:
         InputError: if the motion would overflow.
@@ -232,29 +254,30 @@ def _choose_duration(
         raise input_error(
             "the roots of this design are not known: one of them is at infinity, or nearly so", "parameters"
         )
-    z = rate * np.array([complex(r.re, r.im) for r in structure.roots])
-    abscissa, fastest, largest = map(float, (z.real.max(), np.abs(z.imag).max(), np.abs(z).max()))
+    z = rate_unit * np.array([complex(r.re, r.im) for r in structure.roots])
+    abscissa, max_frequency, max_root_size = map(float, (z.real.max(), np.abs(z.imag).max(), np.abs(z).max()))
     if seconds is not None and seconds * abscissa > _MAX_EXPONENT:
-        accepted = f"accepted: up to {_MAX_EXPONENT / abscissa:.4g}, in which it grows by e^{_MAX_EXPONENT:.0f}"
+        accepted = f"accepted: up to {_MAX_EXPONENT / abscissa:.4g}, in which the motion grows by e^{_MAX_EXPONENT:.0f}"
         raise input_error(f"found {seconds:.6g} for an unstable design; {accepted}", "seconds")
-    size = float(np.linalg.norm(system.A[: len(system.names), : len(system.names)], 2))
-    end_time = _RADIANS / largest if largest > _ROUNDING * size else _DRIFT / (size or 1.0)
-    if not stable or -abscissa < max(_MIN_DECAY * fastest, _ROUNDING * largest):
-        if abscissa > _NO_GROWTH * largest:
-            end_time = min(end_time, _GROWTHS / abscissa)
+    matrix_norm = float(np.linalg.norm(system.A[: len(system.names), : len(system.names)], 2))
+    has_nonzero_root = max_root_size > _ROUNDING * matrix_norm
+    end_time = _MAX_RADIANS / max_root_size if has_nonzero_root else _DRIFT_DURATION / (matrix_norm or 1.0)
+    if not is_stable or -abscissa < max(_MIN_DECAY * max_frequency, _ROUNDING * max_root_size):
+        if abscissa > _NO_GROWTH * max_root_size:
+            end_time = min(end_time, _GROWTH_DURATION / abscissa)
         end_time = _round_up(end_time) if seconds is None else seconds
-        return False, end_time, sample_grid(system.A, x, end_time, fastest, largest)
-    end_time, rows = _DECAYS / -abscissa, [system.rows[name] for name in system.coordinates]
-    for _ in range(_DOUBLINGS):
-        motion = sample_grid(system.A, x, end_time, fastest, largest)
+        return False, end_time, sample_grid(system.A, x, end_time, max_frequency, max_root_size)
+    end_time, rows = _DECAY_DURATION / -abscissa, [system.rows[name] for name in system.coordinates]
+    for _ in range(_MAX_DOUBLINGS):
+        motion = sample_grid(system.A, x, end_time, max_frequency, max_root_size)
         values = np.abs(motion.states @ np.array(rows).T)
         if (values[motion.times > end_time / 2].max(axis=0) <= _STILL_RATIO * values.max(axis=0)).all():
             break
         end_time *= 2
     if seconds is None:
         settled = [measure_output("", row, motion, True).settling for row in rows]
-        last = max((s for s in settled if s > 0), default=end_time)
-        seconds = _round_up(end_time if noisy else _SETTLED_RATIO * last)
+        last_settling_time = max((s for s in settled if s > 0), default=end_time)
+        seconds = _round_up(end_time if has_noise else _SETTLED_RATIO * last_settling_time)
     return True, seconds, motion
 
 
@@ -273,6 +296,6 @@ def _find_peak(name: str, times: Array, values: Array) -> Measure:
 def _compute_deviations(system: System, force: Array) -> Table[float]:
     """Stationary standard deviations of all columns except the path, whose deviation grows without limit."""
     n = len(system.names)
-    spread = stationary_covariance(system.A[:n, :n], force[:n])
+    covariance = stationary_covariance(system.A[:n, :n], force[:n])
     rows = {name: system.rows[name][:n] for name in (*ANGLES, *RATES, *system.torques)}
-    return Table({name: math.sqrt(max(float(row @ spread @ row), 0.0)) for name, row in rows.items()})
+    return Table({name: math.sqrt(max(float(row @ covariance @ row), 0.0)) for name, row in rows.items()})

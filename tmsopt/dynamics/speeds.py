@@ -167,8 +167,8 @@ def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:
     parameter_set, name = problem.parameter_set, speed_of(problem.parameter_set)
     if name is None or not math.isfinite(parameter_set[name].range.lower):
         return None
-    a, ends = coefficients_over(problem, parameter_set, design.parameters, name), parameter_set[name].range
-    return find_crossings(a, ends.lower, ends.upper, bands_only=True).stable
+    a, physical_range = coefficients_over(problem, parameter_set, design.parameters, name), parameter_set[name].range
+    return find_crossings(a, physical_range.lower, physical_range.upper, bands_only=True).stable
 
 
 def speed_of(parameter_set: ParameterSet) -> str | None:
@@ -185,12 +185,12 @@ def coefficients_over(
         InputError: if they are not polynomials.
     """
     nodes = {**problem.as_nodes(parameters), name: symbol(name)}
-    at = problem.model.algebraic(parameter_set.native({n: nodes[n] for n in parameter_set.names}))
+    values = problem.model.algebraic(parameter_set.native({n: nodes[n] for n in parameter_set.names}))
     try:
         with flint.ctx.workdps(DIGITS):
-            polynomials = fold(formula(at.values()), {name: flint.arb_poly([0, 1])}, BALLS)
-            exact_ones = {n: _to_fractions(x) for n, x in zip(at, polynomials, strict=True)}
-            a = [list(flint.fmpq_poly([0]) + c) or [flint.fmpq(0)] for c in problem.model.polynomial(**exact_ones)]
+            polynomials = fold(formula(values.values()), {name: flint.arb_poly([0, 1])}, BALLS)
+            exact_values = {n: _to_fractions(x) for n, x in zip(values, polynomials, strict=True)}
+            a = [list(flint.fmpq_poly([0]) + c) or [flint.fmpq(0)] for c in problem.model.polynomial(**exact_values)]
     except (TypeError, AttributeError, ValueError, ArithmeticError, DomainError):  # not a polynomial
         a = []
     if not any(x != 0 for c in a for x in c):

@@ -13,12 +13,17 @@ from tmsopt.models.bicycles.bicycle import contact_path
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array, Table
 
-ANGLES, RATES, TORQUES = ("phi", "delta"), ("phidot", "deltadot"), ("T_phi", "T_delta")
-"""Names of lean and steer (positive to the right), of their rates, and of a controller's torques."""
+ANGLES = ("phi", "delta")
+"""Names of lean and steer, which are positive to the right."""
 
-_MAX_CONDITION = (
-    1e15  # condition number of a mass matrix, with columns of equal size, above which it counts as singular
-)
+RATES = ("phidot", "deltadot")
+"""Names of the rates of lean and steer."""
+
+TORQUES = ("T_phi", "T_delta")
+"""Names of the torques of a controller."""
+
+_MAX_CONDITION = 1e15
+"""Largest condition number of a mass matrix, with columns of equal size, that does not count as singular."""
 
 
 @dataclass(frozen=True)
@@ -116,49 +121,50 @@ def _build_bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Map
     parameter_set = problem.parameter_set
     native = parameter_set.native(parameters)
     feedback = problem.model.feedback(native) if problem.model.feedback else None
-    lagged, driven = feedback is not None and feedback.lag is not None, dict[str, int]()
+    has_lag, driven = feedback is not None and feedback.lag is not None, dict[str, int]()
     if feedback is not None:
         mass, driven = np.array(feedback.mass, dtype=float), {TORQUES[k]: k for k in sorted(feedback.driven)}
-    names = (*ANGLES, *RATES, *(driven if lagged else ()))
-    yaw, yaw_of_rate, v, w, contact_shift = map(float, contact_path(native))
+    names = (*ANGLES, *RATES, *(driven if has_lag else ()))
+    yaw_per_steer, yaw_per_steer_rate, v, w, contact_shift = map(float, contact_path(native))
     n = len(names)
     matrix = np.zeros((n + 2, n + 2))
     matrix[:n, :n] = A
-    matrix[n, [1, 3]] = yaw, yaw_of_rate
+    matrix[n, [1, 3]] = yaw_per_steer, yaw_per_steer_rate
     matrix[n + 1, n] = v
-    unit = np.eye(n + 2)
-    rows = {**dict(zip(names, unit, strict=False)), "psi": unit[n], "y_rear": unit[n + 1]}
-    rows["y_front"] = unit[n + 1] + w * unit[n] + contact_shift * unit[1]
-    if feedback is not None and not lagged:
+    unit_rows = np.eye(n + 2)
+    rows = {**dict(zip(names, unit_rows, strict=False)), "psi": unit_rows[n], "y_rear": unit_rows[n + 1]}
+    rows["y_front"] = unit_rows[n + 1] + w * unit_rows[n] + contact_shift * unit_rows[1]
+    if feedback is not None and not has_lag:
         gains = np.hstack([np.array(feedback.gains, dtype=float), np.zeros((2, 2))])
         rows |= {name: -gains[k] for name, k in driven.items()}
-    jumps = np.linalg.inv(mass)
-    rate = 1.0 if parameter_set.rate is None else float(parameter_set.rate(parameters))
-    torque = 1.0 if parameter_set.torque is None else float(parameter_set.torque(parameters))
-    length = parameters["w"] / native.get("w", 1.0) if "w" in parameters else 1.0
-    kinds = (  # names, scale, and units of dimensionless and SI parameters
+    inverse_mass = np.linalg.inv(mass)
+    rate_unit = 1.0 if parameter_set.rate is None else float(parameter_set.rate(parameters))
+    torque_unit = 1.0 if parameter_set.torque is None else float(parameter_set.torque(parameters))
+    length_unit = parameters["w"] / native.get("w", 1.0) if "w" in parameters else 1.0
+    column_kinds = (  # names, size of the unit, and text of the unit for dimensionless and for SI parameters
         (("t",), 1.0, ("√(w/g)", "s")),
         ((*ANGLES, "psi"), 1.0, ("rad", "rad")),
-        (RATES, rate, ("rad √(g/w)", "rad/s")),
-        (TORQUES, torque, ("m_B g w", "N m")),
-        (("x", "y_rear", "y_front"), length, ("w", "m")),
+        (RATES, rate_unit, ("rad √(g/w)", "rad/s")),
+        (TORQUES, torque_unit, ("m_B g w", "N m")),
+        (("x", "y_rear", "y_front"), length_unit, ("w", "m")),
     )
-    unit_sizes = {name: size for names_of_kind, size, _ in kinds for name in names_of_kind}
-    states = np.array([unit_sizes[name] for name in (*names, "psi", "y_rear")])
+    unit_sizes = {name: size for names_of_kind, size, _ in column_kinds for name in names_of_kind}
+    state_sizes = np.array([unit_sizes[name] for name in (*names, "psi", "y_rear")])
     impulses = {
-        name: rate / torque * states * np.r_[0.0, 0.0, jumps[:, k], np.zeros(n - 2)] for k, name in enumerate(TORQUES)
+        name: rate_unit / torque_unit * state_sizes * np.r_[0.0, 0.0, inverse_mass[:, k], np.zeros(n - 2)]
+        for k, name in enumerate(TORQUES)
     }
     return System(
         names,
         ANGLES,
-        rate * states[:, None] * matrix / states,
-        Table({name: unit_sizes[name] * row / states for name, row in rows.items()}),
+        rate_unit * state_sizes[:, None] * matrix / state_sizes,
+        Table({name: unit_sizes[name] * row / state_sizes for name, row in rows.items()}),
         Table(impulses),
-        v * rate * length,
+        v * rate_unit * length_unit,
         Table(
             {
-                name: either[parameter_set.rate is not None]
-                for names_of_kind, _, either in kinds
+                name: unit_pair[parameter_set.rate is not None]
+                for names_of_kind, _, unit_pair in column_kinds
                 for name in names_of_kind
             }
         ),

@@ -22,7 +22,7 @@ class FrontPoint:
         objectives: values of the objectives, in the order of the problem.
         solution: the rechecked design; its problem minimises one objective with limits on the others.
         limits: names of the user's active constraints and bounds.
-        label: what is special about the point, e.g. ``least Fr``, ``EP3 -> pair+real``; empty for most.
+        label: what is special about the point, e.g. ``least Fr``, ``EP3 -> pair+real``; empty for most points.
     """
 
     objectives: tuple[float, ...]
@@ -54,7 +54,7 @@ class Kink:
     Attributes:
         name: e.g. ``EP3 -> pair+real``, ``lambda_s.min becomes active``.
         index: index of the last point before the change.
-        width: width of the interval that holds the change, in ranges of the objectives.
+        width: length of the stretch that contains the change, with each objective divided by its range.
     """
 
     name: str
@@ -67,8 +67,8 @@ class Gap:
     """A stretch without points of the front.
 
     Attributes:
-        reason: no efficient design lies there, or a sub-problem was not solved.
-        index: index of the point before the gap; with two objectives the next point ends it.
+        reason: why there are no points: no efficient design was found, or a sub-problem was not solved.
+        index: index of the point before the gap. With two objectives, the gap ends at the next point.
         failed: whether a sub-problem was not solved.
     """
 
@@ -82,14 +82,14 @@ class Front(Tabular):
     """A Pareto front, the result of `pareto`.
 
     Attributes:
-        objectives: the expressions, each minimised.
+        objectives: the expressions that are minimised.
         points: sorted by the first objective, best first; none dominates another.
         kinks: changes along the front; only for two objectives.
         gaps: stretches without points; for three objectives, sub-problems that failed.
         ideal, nadir: smallest and largest value of each objective over the points.
-        solved: number of sub-problems solved.
+        solved: number of sub-problems that were solved.
         notes: sentences for the reader.
-        interrupted: whether the user stopped the search; the front then holds the points found.
+        interrupted: whether the user stopped the search; the front then holds the points that were found.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", 1])  # the abscissa is -c/2 up to c = 2
@@ -145,10 +145,10 @@ class Front(Tabular):
         Raises:
             OSError: if the file cannot be written.
         """
-        words = {None: "", True: "true", False: "false"}
+        text_of = {None: "", True: "true", False: "false"}
         write_csv(
             path,
-            [{**row, "stable": words[row["stable"]]} for row in self.records()],
+            [{**row, "stable": text_of[row["stable"]]} for row in self.records()],
             units_of(self.problem.posed, self.objectives),
         )
 
@@ -169,14 +169,15 @@ def efficient_points(points: Sequence[FrontPoint], slack: Sequence[float]) -> li
     """The points that no other point dominates, sorted by their objectives; equal points are kept once.
 
     Args:
-        slack: largest difference of each objective that rounding explains.
+        slack: for each objective, the largest difference that rounding errors can cause.
     """
-    values, allowed = np.array([p.objectives for p in points]), np.asarray(slack)
+    values, allowed_excess = np.array([p.objectives for p in points]), np.asarray(slack)
     kept_indices: list[int] = []
     for k, objectives in enumerate(values):
         excess = values - objectives
-        dominated = (excess <= allowed).all(axis=1) & (excess < -allowed).any(axis=1)
-        if not dominated.any() and not (np.abs(excess[kept_indices]) <= allowed).all(axis=1).any():
+        is_dominated = (excess <= allowed_excess).all(axis=1) & (excess < -allowed_excess).any(axis=1)
+        if not is_dominated.any() and not (np.abs(excess[kept_indices]) <= allowed_excess).all(axis=1).any():
             kept_indices.append(k)
-    chosen = (points[k] for k in kept_indices)
-    return sorted(chosen, key=lambda p: [float(f"{x:.9g}") for x in p.objectives])  # rounding decides no tie
+    kept_points = (points[k] for k in kept_indices)
+    # rounded, so that rounding errors do not decide
+    return sorted(kept_points, key=lambda p: [float(f"{x:.9g}") for x in p.objectives])

@@ -1,4 +1,4 @@
-"""Pareto fronts by eps-constraints (one objective minimised, limits eps on the others), started from nearby designs."""
+"""Computes Pareto fronts: one objective is minimised with limits eps on the others, starting from nearby designs."""
 
 import time
 from dataclasses import replace
@@ -17,7 +17,7 @@ from tmsopt.fronts.subproblems import (
     can_pickle,
     front_point,
     map_items,
-    minimise_alone,
+    minimise_without_limits,
     solve_end,
 )
 from tmsopt.fronts.surface import fill_surface
@@ -28,11 +28,13 @@ from tmsopt.program.options import CommonOptions, Options, documents_options, ma
 from tmsopt.progress import Steps
 
 POINTS = 25
+"""Default number of points."""
+
 STARTS = 2
-"""New starts per sub-problem, in addition to the neighbours' designs."""
+"""Default number of new starts per sub-problem, in addition to the designs of the neighbours."""
 
 _DEFAULTS = Options(starts=STARTS)
-_NO_CONFLICT = 1e-7  # objectives do not conflict if their relative difference between the ends is at most this
+_NO_CONFLICT = 1e-7  # largest relative difference of an objective between the ends that is no conflict
 
 
 @documents_options(CommonOptions, _DEFAULTS)
@@ -45,7 +47,7 @@ def pareto(
     neighbours that are farthest apart, on the objective that changes more there; sweeps in both directions then keep
     the better design. With three objectives, the limits on two of them form a grid of points × points values, at most
     12 × 12, over their ranges at the ends of the front. Gaps narrower than the spacing of the points may be missed.
-    After Ctrl-C the points found are returned, if one end is known.
+    After Ctrl-C, the points that were found are returned, if an end of the front is known.
 
     Args:
         problem: a problem with ``pareto``; ``locate`` and constraints restrict the designs.
@@ -57,7 +59,7 @@ def pareto(
             as for `solve`.
 
     Raises:
-        NotSolved: if no optimum of an objective is found; the exception holds the best point found.
+        NotSolved: if no optimum of an objective is found; the exception holds the best point that was found.
         InputError: for a problem without ``pareto``, fewer than 2 or more than 10000 points, or less than one process.
 
     Example:
@@ -77,33 +79,33 @@ def pareto(
     faults = count_faults("points", points, 2, MOST_POINTS)
     if faults := faults + ([] if workers is None else count_faults("workers", workers, 1)):
         raise InputError(faults)
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     solver = FrontSolver(problem, replace(choices, progress=None))
-    workers_used = min(workers or cores(), MAX_PARALLEL) if can_pickle(solver) else 1
-    with processes(workers_used) if workers_used > 1 else here() as executor:
-        front = _front(executor, solver, points, choices.progress or Steps(lambda _: None))
+    worker_count = min(workers or cores(), MAX_PARALLEL) if can_pickle(solver) else 1
+    with processes(worker_count) if worker_count > 1 else here() as executor:
+        front = _compute_front(executor, solver, points, choices.progress or Steps(lambda _: None))
     if front.interrupted:
         note = f"the user stopped the search after {front.solved} sub-problems; the front holds the points found so far"
         front = replace(front, notes=(*front.notes, note))
-    return replace(front, seconds=time.perf_counter() - began)
+    return replace(front, seconds=time.perf_counter() - start_time)
 
 
-def _front(executor: Executor, solver: FrontSolver, points: int, progress: Steps) -> Front:
+def _compute_front(executor: Executor, solver: FrontSolver, points: int, progress: Steps) -> Front:
     """Compute the ends of the front, then the points between them."""
     n, single_optima, ends = len(solver.texts), dict[int, Solution](), dict[int, FrontPoint]()
     progress.begin("looking for the ends of the front", "sub-problem")
     progress(0, 2 * n)
     front = Front(solver.problem.problem, solver.texts, (), (), (), n, 0.0)
     try:
-        for k, optimum in map_items(executor, minimise_alone, solver, range(n)):
+        for k, optimum in map_items(executor, minimise_without_limits, solver, range(n)):
             single_optima[k] = optimum
             progress(len(single_optima), 2 * n)
             for solution in (single_optima[j] for j in takewhile(single_optima.__contains__, range(n))):
                 if solution.status != "optimal":
                     raise NotSolved(solution)
         solver = replace(solver, single_optima=single_optima)
-        for k, best in map_items(executor, solve_end, solver, range(n)):
-            ends[k] = replace(front_point(solver, best), label=_label(solver.texts[k].strip()))
+        for k, end_solution in map_items(executor, solve_end, solver, range(n)):
+            ends[k] = replace(front_point(solver, end_solution), label=_label(solver.texts[k].strip()))
             progress(n + len(ends), 2 * n)
     except KeyboardInterrupt:
         if not ends:
@@ -112,9 +114,9 @@ def _front(executor: Executor, solver: FrontSolver, points: int, progress: Steps
     end_points = tuple(ends[k] for k in range(n))
     values = np.array([p.objectives for p in end_points])
     ranges = np.ptp(values, axis=0)
-    conflict = ranges > _NO_CONFLICT * (1 + np.abs(values).max(axis=0))
+    has_conflict = ranges > _NO_CONFLICT * (1 + np.abs(values).max(axis=0))
     solver = replace(solver, ranges=tuple(ranges.tolist()), ends=end_points)
-    if not (conflict.all() if n == 2 else conflict.any()):
+    if not (has_conflict.all() if n == 2 else has_conflict.any()):
         best_in_all = min(end_points, key=lambda p: sum(p.objectives))
         note = "the objectives do not conflict: one design is best in all of them, and the front is that point"
         return replace(front, points=(replace(best_in_all, label="best in all"),), notes=(note,))
@@ -123,6 +125,6 @@ def _front(executor: Executor, solver: FrontSolver, points: int, progress: Steps
 
 def _label(text: str) -> str:
     """The label of the end of the front at which an objective is best."""
-    opposite = text.removeprefix("-").strip()
-    greatest = text != opposite and opposite.isidentifier()
-    return f"greatest {opposite}" if greatest else f"least {text}"
+    positive_text = text.removeprefix("-").strip()
+    is_maximised = text != positive_text and positive_text.isidentifier()
+    return f"greatest {positive_text}" if is_maximised else f"least {text}"

@@ -25,15 +25,18 @@ It does not depend on the number of processes, because the next sub-problems dep
 T = TypeVar("T")
 R = TypeVar("R")
 
-RETRY = 16
+RETRY_STARTS = 16
 """Number of starts of a sub-problem that was not solved from the designs of the neighbours and a few starts."""
 
-# When an objective has its best value, a limit at this value plus the relative slack keeps it there while the next
-# objective is minimised. The recheck of constraints tolerates this slack.
 _SLACK = 1e-9
-_AT_BOUND = 1e-6  # fraction of a range; IPOPT keeps this distance to a bound, also after polishing at degenerate limits
-_WORSE = 1e-6  # relative: a side of the box is skipped only if its optimum is worse by more than this
-_MIN_GAIN = 1e-4  # relative; smaller gains may come from the slack, which gives sqrt(1e-9) = 3e-5 at a smooth optimum
+"""Relative slack of a limit that keeps an objective at its best value while the next objective is minimised.
+
+The recheck of constraints tolerates this slack.
+"""
+_BOUND_DISTANCE = 1e-6  # largest distance of an active bound, as a fraction of its range: IPOPT keeps such a distance
+_WORSE_SIDE = 1e-6  # a side of the box is skipped if its optimum is worse by more than this relative difference
+_MIN_GAIN = 1e-4
+"""Smallest relative gain. Smaller gains may come from the slack, which gives sqrt(1e-9) = 3e-5 at a smooth optimum."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,8 @@ class FrontSolver:
         options: options of each solve; its new starts find branches that starts from the neighbours do not reach.
         ranges: ranges of the objectives over the front, once its ends are known.
         ends: the ends of the front, once known.
-        single_optima: the optimum of each objective alone, where known; no sub-problem has a better one.
+        single_optima: index of an objective → its optimum without limits on the others. No sub-problem has a better
+            value of this objective.
     """
 
     problem: Posed
@@ -64,24 +68,24 @@ class FrontSolver:
         return solve_any_status(problem, options, nearby_starts, without_sample, self._worse_sides(problem, near))
 
     def _worse_sides(self, problem: Posed, near: Sequence[Solution]) -> frozenset[str]:
-        """Sides of the box on which the optimum of an objective is worse than its limit, or than a point found."""
+        """Sides of the box on which the optimum of an objective is worse than its limit, or than a known point."""
         names = limit_names(self)
         limits = {k: problem.constraints[n] for k, n in enumerate(names) if n in problem.constraints}
         max_values = {k: float(text.rpartition("<=")[2]) for k, text in limits.items()}
         worse_sides = set[str]()
-        for k, best in self.single_optima.items():
-            if not best.sides:
+        for k, optimum in self.single_optima.items():
+            if not optimum.sides:
                 continue
-            if problem.minimize == self.texts[k] and problem.free == self.problem.free:  # points found are upper bounds
+            if problem.minimize == self.texts[k] and problem.free == self.problem.free:  # known values are upper bounds
                 known_values = [*(p.objectives for p in self.ends), *(objective_values(self, n) for n in near)]
                 reached_values = [
                     values[k] for values in known_values if all(values[j] <= limit for j, limit in max_values.items())
                 ]
                 max_values = {**max_values, k: min(reached_values, default=math.inf)}
             limit = max_values.get(k, math.inf)
-            worse_sides |= {n for n, value in best.sides.items() if value > limit + _WORSE * (1 + abs(limit))}
-        every_side = {n for best in self.single_optima.values() for n in best.sides}
-        return frozenset(worse_sides if worse_sides < every_side else ())
+            worse_sides |= {n for n, value in optimum.sides.items() if value > limit + _WORSE_SIDE * (1 + abs(limit))}
+        all_sides = {n for optimum in self.single_optima.values() for n in optimum.sides}
+        return frozenset(worse_sides if worse_sides < all_sides else ())
 
     def reseed(self, count: int) -> "FrontSolver":
         """The same solver with other random starts."""
@@ -93,26 +97,26 @@ class FrontSolver:
         return tuple(self.problem.pareto)
 
 
-def minimise_alone(solver: FrontSolver, k: int) -> Solution:
+def minimise_without_limits(solver: FrontSolver, k: int) -> Solution:
     """Minimise objective `k` without limits on the others; return a solution of any status."""
     return solver.solve(build_subproblem(solver, k, {}), STARTS)
 
 
-def solve_end(solver: FrontSolver, first: int) -> Solution:
-    """An end of the front: minimise one objective, then the others in turn while the earlier ones keep their values."""
+def solve_end(solver: FrontSolver, best_objective: int) -> Solution:
+    """An end of the front: minimise one objective, then the others in turn while earlier ones keep their values."""
     count = len(solver.texts)
-    design, value_limits = solver.single_optima[first], dict[int, float]()
-    for held_objective, k in pairwise((first + j) % count for j in range(count)):
+    design, value_limits = solver.single_optima[best_objective], dict[int, float]()
+    for held_objective, k in pairwise((best_objective + j) % count for j in range(count)):
         values = objective_values(solver, design)
         value_limits[held_objective] = values[held_objective] + _SLACK * (1 + abs(values[held_objective]))
-        better = minimise_limited(solver, k, value_limits, [design], fixed_objective=first)
-        if better is None:
+        better_design = minimise_limited(solver, k, value_limits, [design], fixed_objective=best_objective)
+        if better_design is None:
             continue
         # A parameter that `minimise_limited` fixed has no slack.
-        without_slack = len(value_limits) == 1 and len(better.problem.free) < len(solver.problem.free)
-        gain = values[k] - objective_values(solver, better)[k]
+        without_slack = len(value_limits) == 1 and len(better_design.problem.free) < len(solver.problem.free)
+        gain = values[k] - objective_values(solver, better_design)[k]
         if gain >= 0 if without_slack else gain > _MIN_GAIN * (1 + abs(values[k])):
-            design = better
+            design = better_design
     return design
 
 
@@ -138,15 +142,12 @@ def minimise_limited(
     problem = build_subproblem(solver, k, limits)
     if fixed_objective is not None:
         problem = _fix_at_bound(solver, problem, fixed_objective, near[0])
-    results = [
-        solver.solve(
-            problem, (0 if nearby_only else solver.options.starts) if near else RETRY, near, without_sample=nearby_only
-        )
-    ]
+    starts = RETRY_STARTS if not near else 0 if nearby_only else solver.options.starts
+    results = [solver.solve(problem, starts, near, without_sample=nearby_only)]
     if not nearby_only and all(s.status != "optimal" for s in results):
-        results.append(solver.reseed(1).solve(problem, RETRY))
+        results.append(solver.reseed(1).solve(problem, RETRY_STARTS))
     best = min((s for s in results if s.status == "optimal"), key=lambda s: s.value, default=None)
-    return best if best is None or not solver.ranges else _improve_loose(solver, k, limits, best)
+    return best if best is None or not solver.ranges else _improve_inactive(solver, k, limits, best)
 
 
 def build_subproblem(solver: FrontSolver, k: int, limits: Mapping[int, float]) -> Posed:
@@ -192,32 +193,34 @@ def objective_values(solver: FrontSolver, solution: Solution) -> tuple[float, ..
 
 def front_point(solver: FrontSolver, solution: Solution) -> FrontPoint:
     """A point of the front from a solution."""
-    active = [n for n in solution.active if n in solver.problem.constraints]
+    active_names = [n for n in solution.active if n in solver.problem.constraints]
     for name, (low, high) in solver.problem.free.items():
         bounds = (("min", low), ("max", high))
-        active += [
+        active_names += [
             f"{name}.{end}"
             for end, bound in bounds
-            if abs(solution.parameters[name] - bound) <= _AT_BOUND * (high - low)
+            if abs(solution.parameters[name] - bound) <= _BOUND_DISTANCE * (high - low)
         ]
-    return FrontPoint(objective_values(solver, solution), solution, tuple(active))
+    return FrontPoint(objective_values(solver, solution), solution, tuple(active_names))
 
 
-def _improve_loose(solver: FrontSolver, k: int, limits: Mapping[int, float], design: Solution) -> Solution:
-    """A design that is as good in objective `k` and better in those whose limits are inactive, or the same design."""
+def _improve_inactive(solver: FrontSolver, k: int, limits: Mapping[int, float], design: Solution) -> Solution:
+    """A design that is as good in objective `k` and better in objectives with inactive limits; or the same design."""
     names = limit_names(solver)
-    inactive = [j for j in limits if names[j] not in design.active and solver.ranges[j] > 0]
-    if not inactive:
+    inactive_objectives = [j for j in limits if names[j] not in design.active and solver.ranges[j] > 0]
+    if not inactive_objectives:
         return design
     values = objective_values(solver, design)
     value_limits = {**limits, k: values[k] + _SLACK * (1 + abs(values[k]))}
-    scaled_sum = " + ".join(f"({solver.texts[j]}) / {solver.ranges[j]!r}" for j in inactive)
+    scaled_sum = " + ".join(f"({solver.texts[j]}) / {solver.ranges[j]!r}" for j in inactive_objectives)
     problem = _fix_at_bound(solver, build_subproblem(solver, k, value_limits).derive(minimize=scaled_sum), k, design)
-    better = solver.solve(problem, solver.options.starts, [design])
+    better_design = solver.solve(problem, solver.options.starts, [design])
     gain = sum(
-        (values[j] - b) / solver.ranges[j] for j, b in enumerate(objective_values(solver, better)) if j in inactive
+        (values[j] - b) / solver.ranges[j]
+        for j, b in enumerate(objective_values(solver, better_design))
+        if j in inactive_objectives
     )
-    return better if better.status == "optimal" and gain > _MIN_GAIN else design
+    return better_design if better_design.status == "optimal" and gain > _MIN_GAIN else design
 
 
 def _fix_at_bound(solver: FrontSolver, problem: Posed, k: int, best: Solution) -> Posed:
@@ -241,18 +244,18 @@ def map_items(
         EngineError: if every process that works on an item crashes.
     """
     with closing(executor.map(partial(function, solver), items)) as results:
-        for place, result in results:
+        for index, result in results:
             if isinstance(result, Crash):
                 raise EngineError(f"a sub-problem of the front ends its process ({result.cause})")
-            yield place, result
+            yield index, result
 
 
-def can_pickle(thing: Any) -> bool:
+def can_pickle(value: Any) -> bool:
     """Whether an object can be sent to another process; a user's model may not."""
     import cloudpickle
 
     try:
-        cloudpickle.dumps(thing)
+        cloudpickle.dumps(value)
     except Exception:
         return False
     return True

@@ -12,7 +12,7 @@ import numpy as np
 from tmsopt.executor import Executor
 from tmsopt.fronts.front import Front, Gap, efficient_points
 from tmsopt.fronts.subproblems import (
-    RETRY,
+    RETRY_STARTS,
     FrontSolver,
     build_subproblem,
     front_point,
@@ -23,22 +23,22 @@ from tmsopt.fronts.subproblems import (
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Steps
 
-MAX_SIDE = 12
-"""Largest number of limits per objective; the grid then has 144 cells."""
+MAX_LIMITS = 12
+"""Largest number of limits per objective. A grid with this number has 144 cells."""
 
-_SAME = 1e-7  # fraction of the range: points that are closer are equal; the ends have a slack of 1e-9
+_SAME_POINT = 1e-7  # points that are closer than this fraction of the range are equal; ends have a slack of 1e-9
 
 
 class _Cell(NamedTuple):
-    """A sub-problem: its position in the grid, limits on objectives, nearby designs, and its number."""
+    """A sub-problem: its position in the grid, objective → its limit, nearby designs, and its number in the search."""
 
-    place: tuple[int, int]
+    position: tuple[int, int]
     limits: Mapping[int, float]
     near: tuple[Solution, ...]
     number: int
 
 
-def fill_surface(executor: Executor, solver: FrontSolver, front: Front, points: int, progress: Steps) -> Front:
+def fill_surface(executor: Executor, solver: FrontSolver, front: Front, point_count: int, progress: Steps) -> Front:
     """Compute the points of the front between its ends; sub-problems that failed become gaps.
 
     Objective 0 is minimised with limits on objectives 1 and 2, from loose to tight; the cells of one diagonal of the
@@ -49,42 +49,46 @@ def fill_surface(executor: Executor, solver: FrontSolver, front: Front, points: 
     ends = solver.ends
     values = np.array([p.objectives for p in ends])
     low, high = values.min(axis=0), values.max(axis=0)
-    side, count, interrupted = min(points, MAX_SIDE), 0, False
-    solved: dict[tuple[int, int], Solution | None] = {(side, side): ends[0].solution}  # the loosest limits are inactive
-    failed: dict[int, str] = {}
+    limit_count, solved_count, is_interrupted = min(point_count, MAX_LIMITS), 0, False
+    loosest = limit_count, limit_count  # these limits are inactive
+    optima: dict[tuple[int, int], Solution | None] = {loosest: ends[0].solution}
+    failed_texts: dict[int, str] = {}
     try:
-        for diagonal in range(2 * side - 1, 1, -1):
+        for diagonal in range(2 * limit_count - 1, 1, -1):
             cells: list[_Cell] = []
-            for i, j in ((i, diagonal - i) for i in range(side, 0, -1) if 1 <= diagonal - i <= side):
-                looser = [cell for cell in ((i + 1, j), (i, j + 1)) if max(cell) <= side]
-                if any(cell not in solved for cell in looser):  # looser limits are already infeasible
+            for i, j in ((i, diagonal - i) for i in range(limit_count, 0, -1) if 1 <= diagonal - i <= limit_count):
+                looser_cells = [cell for cell in ((i + 1, j), (i, j + 1)) if max(cell) <= limit_count]
+                if any(cell not in optima for cell in looser_cells):  # looser limits are already infeasible
                     continue
-                limits = {k: float(low[k] + (high[k] - low[k]) * step / side) for k, step in ((1, i), (2, j))}
-                near = [s for s in map(solved.get, looser) if s is not None]
+                limits = {k: float(low[k] + (high[k] - low[k]) * step / limit_count) for k, step in ((1, i), (2, j))}
+                near = [s for s in map(optima.get, looser_cells) if s is not None]
                 allowed_designs = [
                     s for s in near if all(objective_values(solver, s)[k] <= v for k, v in limits.items())
                 ]
                 if allowed_designs:  # the optimum under looser limits is the optimum here
-                    solved[i, j] = allowed_designs[0]
+                    optima[i, j] = allowed_designs[0]
                 else:
                     near = near or [p.solution for p in ends]
-                    cells.append(_Cell((i, j), limits, tuple(near), count + len(cells)))
-            for k, (optimum, feasible) in map_items(executor, _solve_cell, solver, cells):
-                count, solved_cell = count + 1, cells[k]
-                progress(count, side * side - 1)
-                if feasible:
-                    solved[solved_cell.place] = optimum
-                if feasible and optimum is None:
-                    failed[solved_cell.number] = " and ".join(
+                    cells.append(_Cell((i, j), limits, tuple(near), solved_count + len(cells)))
+            for k, (optimum, is_feasible) in map_items(executor, _solve_cell, solver, cells):
+                solved_count, solved_cell = solved_count + 1, cells[k]
+                progress(solved_count, limit_count * limit_count - 1)
+                if is_feasible:
+                    optima[solved_cell.position] = optimum
+                if is_feasible and optimum is None:
+                    failed_texts[solved_cell.number] = " and ".join(
                         f"{solver.texts[n]} <= {v:.6g}" for n, v in solved_cell.limits.items()
                     )
     except KeyboardInterrupt:
-        interrupted = True
-    ordered = [solved[cell] for cell in sorted(solved, key=lambda cell: (-sum(cell), -cell[0]))]
-    all_points = [*ends, *(front_point(solver, s) for s in {id(s): s for s in ordered if s is not None}.values())]
-    front_points = efficient_points(all_points, _SAME * (high - low))
-    gaps = tuple(Gap(f"not solved for {text}; try more starts", 0, True) for _, text in sorted(failed.items()))
-    return replace(front, points=tuple(front_points), gaps=gaps, solved=count + 3, interrupted=interrupted)
+        is_interrupted = True
+    ordered_designs = [optima[cell] for cell in sorted(optima, key=lambda cell: (-sum(cell), -cell[0]))]
+    all_points = [
+        *ends,
+        *(front_point(solver, s) for s in {id(s): s for s in ordered_designs if s is not None}.values()),
+    ]
+    front_points = efficient_points(all_points, _SAME_POINT * (high - low))
+    gaps = tuple(Gap(f"not solved for {text}; try more starts", 0, True) for _, text in sorted(failed_texts.items()))
+    return replace(front, points=tuple(front_points), gaps=gaps, solved=solved_count + 3, interrupted=is_interrupted)
 
 
 def _solve_cell(solver: FrontSolver, cell: _Cell) -> tuple[Solution | None, bool]:
@@ -95,5 +99,5 @@ def _solve_cell(solver: FrontSolver, cell: _Cell) -> tuple[Solution | None, bool
     """
     optimum = minimise_limited(solver.reseed(cell.number), 0, cell.limits, cell.near)
     return optimum, optimum is not None or solver.solve(
-        build_subproblem(solver, 0, cell.limits), RETRY
+        build_subproblem(solver, 0, cell.limits), RETRY_STARTS
     ).status != "infeasible"

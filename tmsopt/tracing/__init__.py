@@ -1,4 +1,4 @@
-"""Traces sets of exceptional points as curves with events; domains of stability; the swallowtail.
+"""Traces curves of exceptional points with their events, boundaries of stability, and the swallowtail surface.
 
 A pattern of roots must leave one degree of freedom. `trace` finds its curves in the box of the free parameters, each as
 a `Branch`. `continuation` follows one curve, `seeds` finds points on new curves, and `events` locates special points on

@@ -25,7 +25,7 @@ class EventPoint:
             of the next branch.
         detail: the event in words, such as the parameter that folds or the limit that ends the branch.
         parameters: every parameter of the point.
-        index: row of the branch.
+        index: index of the point among the points of the branch.
         residual: relative mismatch of the coefficients at the point.
 
     Example:
@@ -48,7 +48,7 @@ class Branch(Tabular):
     """A curve of designs with one root pattern; every event is one of its points.
 
     Attributes:
-        pattern: the pattern traced.
+        pattern: name of the traced pattern.
         parameters: name → values along the curve, every parameter of the set, shape (n,).
         unknowns: factor coefficients of the pattern, by name, shape (n,).
         tangent: free parameter → its derivative by the arclength.
@@ -58,15 +58,15 @@ class Branch(Tabular):
         heavily_damped: whether all roots are real and negative, except the roots that the pattern places at 0.
         satisfied: whether every inequality constraint of the problem holds.
         abscissa: largest real part of the roots, from the factors.
-        events: in the order of the arclength.
-        closed: whether the last point is the first.
+        events: events on the curve, in the order of the arclength.
+        closed: whether the last point is equal to the first.
         residual: largest mismatch of a coefficient along the curve, relative to its terms.
         eigenfrequency: the multiple eigenfrequency of a complex system as ``omega_re`` and ``omega_im``, which are
             printed instead of `unknowns`; None for a real system.
 
     Example:
         >>> branch = tmsopt.trace("problems/ep_set.toml").branches[0]
-        >>> law = tmsopt.laws.epset(-0.4, -0.2, branch.parameters["lambda_s"])  # of the paper; no part of the trace
+        >>> law = tmsopt.laws.epset(-0.4, -0.2, branch.parameters["lambda_s"])  # the law of the paper
         >>> bool(abs(branch.parameters["Fr"] - law).max() < 1e-9)
         True
 
@@ -167,11 +167,11 @@ class Trace(Tabular):
     def varying(self) -> list[str]:
         """The free parameters; those that are constant on every branch come last."""
 
-        def moves(name: str) -> bool:
+        def is_varying(name: str) -> bool:
             low, high = self.problem.free[name]
             return any(np.ptp(b.parameters[name]) > 1e-9 * (high - low) for b in self.branches)
 
-        return sorted(self.problem.free, key=lambda name: not moves(name))
+        return sorted(self.problem.free, key=lambda name: not is_varying(name))
 
     def records(self) -> Iterable[dict[str, Any]]:
         """The points of all branches, with a first column `branch`."""
@@ -214,7 +214,7 @@ class BranchPoint:
 
     Example:
         >>> point = next(tmsopt.continue_from("problems/ep_set.toml"))
-        >>> law = tmsopt.laws.epset(-0.4, -0.2, point.parameters["lambda_s"])  # of the paper; no part of the trace
+        >>> law = tmsopt.laws.epset(-0.4, -0.2, point.parameters["lambda_s"])  # the law of the paper
         >>> bool(abs(point.parameters["Fr"] - law) < 1e-12)
         True
 

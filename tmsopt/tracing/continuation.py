@@ -1,7 +1,7 @@
 """Pseudo-arclength continuation of a smooth curve F(x) = 0, n equations in n + 1 variables.
 
 Keller's method: predict along the tangent, then correct by Newton's method on F = 0 at a fixed arclength. One CasADi
-function of scalar operations holds the predictor, three corrections and the new tangent: a point costs one call.
+function of scalar operations holds the predictor, three corrections and the new tangent, so a point costs one call.
 
 `follow` yields the points one by one; `walk` collects them.
 """
@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -18,23 +18,22 @@ import numpy as np
 from tmsopt.records import Array
 from tmsopt.tracing.solving import MappedFunction, evaluate_rows, find_zeros, map_rows
 
-_NEWTON_TOLERANCE = 1e-8  # largest last Newton step, relative to the point; the error that remains is its square
-_MAX_CONTRACTION = 0.1  # largest ratio of the second Newton step to the first; above it the step was too long
+_NEWTON_TOLERANCE = 1e-8  # largest last Newton step, relative to the size of the point; its square is the error
+_MAX_CONTRACTION = 0.1  # largest ratio of the second Newton step to the first; otherwise the step was too long
 _MIN_COSINE = np.cos(0.15)  # cosine of the largest angle between successive tangents
-_MIN_STEP = 1e-12  # if even this step fails, the curve ends
+_MIN_STEP = 1e-12  # the curve ends where even a step of this length fails
 _STEP_GROWTH = 1.5  # ratio of successive steps
-_UNBOUNDED_RATIO = (
-    4.0  # steps of variables without limits are this many times longer, since their spacing does not matter
-)
+_UNBOUNDED_RATIO = 4.0
+"""Steps of variables without limits are this many times longer, since their spacing does not matter."""
 _REMOTE_SIZE = 100.0  # size of a variable, in units of the scale, above which the steps grow
 _MAX_SIZE = 1e6  # size above which the equations lose their digits, so that the curve ends
-_INFINITE_SIZE = 1e5  # size above which a failed step means infinity; which step fails depends on rounding
+_INFINITE_SIZE = 1e5  # size above which a failed step means infinity; rounding may end the curve before `_MAX_SIZE`
 _SAME_POINT = 1e-7  # relative distance up to which two points count as one
-_LIMIT_ROUNDING = 1e-12  # rounding of a variable of order 1 on a curve that lies in a limit
+_LIMIT_ROUNDING = 1e-12  # rounding error of a variable of order 1 on a curve along which it stays at its limit
 CLOSED = "closed"
 SINGULAR = "singular: the curve branches or has no direction here"
 INFINITE = "a root goes to infinity: a0 vanishes"
-_RANK = 1e-6  # relative singular value below which the equations do not determine a direction
+_MIN_SINGULAR_VALUE = 1e-6  # relative singular value below which the equations do not determine a direction
 
 
 @dataclass(frozen=True)
@@ -45,8 +44,8 @@ class Curve:
         scale: units of the variables.
         lower, upper: limits of y; infinite without a limit.
         evaluate: y → F and its Jacobian in y.
-        advance: (y, t, s, origin) → next y, next t, and the numbers by which `follow` accepts the step. None for more
-            than n equations.
+        advance: (point y, tangent t, arclength s, first point of the curve) → next y, next t, and the numbers of
+            `_StepChecks`. None for more than n equations.
     """
 
     scale: Array
@@ -54,6 +53,30 @@ class Curve:
     upper: Array
     evaluate: ca.Function = field(repr=False)
     advance: Any = field(repr=False)
+
+
+class _StepChecks(NamedTuple):
+    """The numbers by which `follow` accepts a step.
+
+    Attributes:
+        correction_1, correction_2, correction_3: sizes of the three Newton corrections, relative to the point.
+        cosine: cosine of the angle between the tangents before and after the step.
+        step_factor: arclength that the next step may have, in units of the longest step.
+        slack: least distance to a limit; negative outside the limits.
+        size: largest absolute value of a variable.
+        first_distance: distance between the point before the step and the first point of the curve.
+        first_arclength: this distance along the tangent; positive if the first point lies ahead.
+    """
+
+    correction_1: float
+    correction_2: float
+    correction_3: float
+    cosine: float
+    step_factor: float
+    slack: float
+    size: float
+    first_distance: float
+    first_arclength: float
 
 
 @dataclass(frozen=True)
@@ -66,10 +89,10 @@ class CurvePoint:
 
 @dataclass(frozen=True)
 class End:
-    """Why a walk ended; `limit` is the index of the variable that reached a limit."""
+    """Why a walk ended; `variable` is the index of the variable that reached a limit, if one did."""
 
     reason: str
-    limit: int | None = None
+    variable: int | None = None
 
 
 @dataclass(frozen=True)
@@ -93,17 +116,23 @@ class Walk:
 
 
 def compile_curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Array) -> Curve:
-    """Compile the curve equations(x) = 0 of a CasADi symbol x with n + 1 entries; limits are of x.
+    """Compile the curve equations(x) = 0, where x is a CasADi symbol with n + 1 entries.
 
-    The zeros of more than n equations are isolated points. To find them, `Curve.evaluate` is enough.
+    `lower` and `upper` are limits of x, not of y. The zeros of more than n equations are isolated points. To find them,
+    `Curve.evaluate` is enough.
     """
-    size, unit = x.numel(), ca.DM(scale)
+    variable_count, unit = x.numel(), ca.DM(scale)
     system = ca.Function("system", [x], [equations, ca.jacobian(equations, x)])
-    y, t, s, origin = ca.SX.sym("y", size), ca.SX.sym("t", size), ca.SX.sym("s"), ca.SX.sym("origin", size)
+    y, t, s, origin = (
+        ca.SX.sym("y", variable_count),
+        ca.SX.sym("t", variable_count),
+        ca.SX.sym("s"),
+        ca.SX.sym("origin", variable_count),
+    )
     value, jacobian = system(y * unit)
     scaled_system = ca.Function("scaled", [y], [ca.densify(value), ca.densify(ca.densify(jacobian) @ ca.diag(unit))])
     low, high = lower / scale, upper / scale
-    if equations.numel() != size - 1:
+    if equations.numel() != variable_count - 1:
         return Curve(scale, low, high, scaled_system, None)
     z, sizes = y + s * t, []
     for _ in range(3):
@@ -112,16 +141,16 @@ def compile_curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Arr
         z = z - correction
         sizes.append(ca.norm_2(correction) / (1 + ca.norm_inf(z)))
     value, jacobian = scaled_system(z)
-    tangent = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(ca.DM.zeros(size - 1), 1))
+    tangent = ca.solve(ca.vertcat(jacobian, t.T), ca.vertcat(ca.DM.zeros(variable_count - 1), 1))
     tangent = tangent / ca.norm_2(tangent)
 
-    boxed = np.isfinite(low) & np.isfinite(high)
-    unboxed = _UNBOUNDED_RATIO * (1 + ca.fabs(z)) * ca.sqrt(ca.fmax(1, ca.fabs(z) / _REMOTE_SIZE))
-    room = ca.vertcat(*(1 if boxed[k] else unboxed[k] for k in range(size)))
-    reach = ca.mmin(room / (ca.fabs(tangent) + 1e-300))
+    is_bounded = np.isfinite(low) & np.isfinite(high)
+    unbounded_room = _UNBOUNDED_RATIO * (1 + ca.fabs(z)) * ca.sqrt(ca.fmax(1, ca.fabs(z) / _REMOTE_SIZE))
+    room = ca.vertcat(*(1 if is_bounded[k] else unbounded_room[k] for k in range(variable_count)))
+    step_factor = ca.mmin(room / (ca.fabs(tangent) + 1e-300))
     slack = ca.mmin(ca.vertcat(z - low, high - z))
     checks = ca.vertcat(
-        *sizes, ca.dot(t, tangent), reach, slack, ca.norm_inf(z), ca.norm_2(origin - y), ca.dot(t, origin - y)
+        *sizes, ca.dot(t, tangent), step_factor, slack, ca.norm_inf(z), ca.norm_2(origin - y), ca.dot(t, origin - y)
     )
     return Curve(scale, low, high, scaled_system, ca.Function("advance", [y, t, s, origin], [z, tangent, checks]))
 
@@ -137,7 +166,7 @@ def compute_tangent(curve: Curve, y: Array) -> Array:
         norm = np.linalg.norm(balanced, axis=axis, keepdims=True)
         balanced = balanced / np.where(norm > 0, norm, 1.0)
     singular = np.linalg.svd(balanced, compute_uv=False)
-    if singular[-1] <= _RANK * singular[0]:
+    if singular[-1] <= _MIN_SINGULAR_VALUE * singular[0]:
         raise ValueError("the equations do not determine a direction here")
     return np.asarray(np.linalg.svd(jacobian)[2][-1])
 
@@ -148,41 +177,39 @@ def follow(curve: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
     The curve ends at a limit, at its first point (it is closed), at a singular point, or near infinity.
     """
 
-    def advance(y: Array, t: Array, s: float) -> tuple[Any, ...]:
+    def advance(y: Array, t: Array, s: float) -> tuple[Array, Array, _StepChecks]:
         next_y, tangent, checks = step_from(y[None], t[None], np.array([[s]]), start.y[None])
-        return next_y[0], tangent[0], *checks[0].tolist()
+        return next_y[0], tangent[0], _StepChecks(*checks[0].tolist())
 
     y, t, count, step_from = start.y, start.t, 1, MappedFunction(curve.advance, 1)
-    s, reach = step / 4, advance(y, t, 0.0)[6]
+    s, (*_, checks) = step / 4, advance(y, t, 0.0)
     while True:
-        s = min(s, step * reach)
+        s = min(s, step * checks.step_factor)
         while True:
-            next_y, tangent, first, second, third, cosine, reach, slack, largest, origin_distance, origin_step = (
-                advance(y, t, s)
-            )
+            next_y, tangent, checks = advance(y, t, s)
             if (
-                third <= _NEWTON_TOLERANCE
-                and cosine >= _MIN_COSINE
-                and (second <= _MAX_CONTRACTION * first or first < 1e-6)
+                checks.correction_3 <= _NEWTON_TOLERANCE
+                and checks.cosine >= _MIN_COSINE
+                and (checks.correction_2 <= _MAX_CONTRACTION * checks.correction_1 or checks.correction_1 < 1e-6)
             ):
-                break  # never for nan
+                break  # a step with nan is never accepted
             s /= 2
             if s < _MIN_STEP:
                 yield End(INFINITE if np.abs(y).max() > _INFINITE_SIZE else SINGULAR)
                 return
         if (
             count > 2
-            and 0 < origin_step <= s
-            and origin_distance <= 2 * s
-            and _is_same_point(advance(y, t, origin_step)[0], start.y)
+            and 0 < checks.first_arclength <= s
+            and checks.first_distance <= 2 * s
+            and _is_same_point(advance(y, t, checks.first_arclength)[0], start.y)
         ):
             yield from (start, End(CLOSED))
             return
-        if slack < 0 and not _runs_along_limit(curve, next_y, tangent):
+        if checks.slack < 0 and not _runs_along_limit(curve, next_y, tangent):
             yield from _stop_at_limit(curve, y, t, s, next_y)
             return
         yield CurvePoint(next_y, tangent)
-        if largest > _MAX_SIZE:
+        if checks.size > _MAX_SIZE:
             yield End(INFINITE)
             return
         y, t, s, count = next_y, tangent, s * _STEP_GROWTH, count + 1
@@ -197,36 +224,38 @@ def walk(curve: Curve, y: Array, t: Array, step: float, max_points: int) -> Walk
 
 
 def walk_both_ways(curve: Curve, y: Array, step: float, max_points: int) -> Walk | None:
-    """The whole curve through a point; None if it is not a regular point of a curve."""
+    """Return the whole curve through a point.
+
+    Return None if the point is not a regular point of a curve, or if the curve has two points or fewer.
+    """
     started = time.perf_counter()
     try:
         t = compute_tangent(curve, y)
     except ValueError:
         return None
-    forward_walk = walk(curve, y, t, step, max_points)
-    if not forward_walk.closed:
+    whole_walk = walk(curve, y, t, step, max_points)
+    if not whole_walk.closed:
         backward_walk = walk(curve, y, -t, step, max_points)
         points, tangents = (
-            np.concatenate(x)
-            for x in ([backward_walk.y[:0:-1], forward_walk.y], [-backward_walk.t[:0:-1], forward_walk.t])
+            np.concatenate(x) for x in ([backward_walk.y[:0:-1], whole_walk.y], [-backward_walk.t[:0:-1], whole_walk.t])
         )
-        forward_walk = Walk(points, tangents, (backward_walk.ends[1], forward_walk.ends[1]))
-    return replace(forward_walk, seconds=time.perf_counter() - started) if len(forward_walk.y) > 2 else None
+        whole_walk = Walk(points, tangents, (backward_walk.ends[1], whole_walk.ends[1]))
+    return replace(whole_walk, seconds=time.perf_counter() - started) if len(whole_walk.y) > 2 else None
 
 
 def step_along(curve: Curve, y: Array, t: Array, s: Array) -> tuple[Array, Array]:
-    """Points and tangents at arclengths s from points of the curve, row by row; |s| is at most a step."""
+    """Points and tangents at arclengths s from the points y, row by row; |s| is at most the length of a step."""
     new_points, tangent, _ = map_rows(curve.advance, y, t, s[:, None], y)
     return new_points, tangent
 
 
-def is_on_walk(curve: Curve, walked: Walk, y: Array) -> bool:
-    """Whether a point lies on a curve that was walked."""
-    distances = np.linalg.norm(walked.y - y, axis=1)
+def is_on_walk(curve: Curve, walk: Walk, y: Array) -> bool:
+    """Whether a point lies on the curve of a walk."""
+    distances = np.linalg.norm(walk.y - y, axis=1)
     k = int(np.argmin(distances))
-    if distances[k] > 2 * np.linalg.norm(np.diff(walked.y[max(k - 1, 0) : k + 2], axis=0), axis=1).max(initial=0.0):
+    if distances[k] > 2 * np.linalg.norm(np.diff(walk.y[max(k - 1, 0) : k + 2], axis=0), axis=1).max(initial=0.0):
         return False
-    new_points, _ = step_along(curve, walked.y[[k]], walked.t[[k]], np.array([walked.t[k] @ (y - walked.y[k])]))
+    new_points, _ = step_along(curve, walk.y[[k]], walk.t[[k]], np.array([walk.t[k] @ (y - walk.y[k])]))
     return _is_same_point(new_points[0], y)
 
 
@@ -236,22 +265,25 @@ def _is_same_point(y: Array, reference: Array) -> bool:
 
 
 def _runs_along_limit(curve: Curve, y: Array, t: Array) -> bool:
-    """Whether a curve outside the limits runs along one, up to rounding."""
+    """Whether a point is outside a limit only by rounding, because the curve runs along this limit."""
     excess = np.maximum(curve.lower - y, y - curve.upper)
     is_violated = excess > 0
     return bool(np.all(excess[is_violated] <= _LIMIT_ROUNDING) and np.all(np.abs(t[is_violated]) <= _LIMIT_ROUNDING))
 
 
 def _stop_at_limit(curve: Curve, y: Array, t: Array, s: float, outer_point: Array) -> tuple[CurvePoint, End]:
-    """The point where a step s from y to a point outside first meets a limit; the point lies on the limit exactly."""
+    """The first point, exactly on a limit, of a step s from y to a point outside the limits; and the `End` there."""
     limits = np.clip(outer_point, curve.lower, curve.upper)
-    k = np.flatnonzero(limits != outer_point)
-    points, tangents = np.tile(y, (len(k), 1)), np.tile(t, (len(k), 1))
+    crossed = np.flatnonzero(limits != outer_point)
+    points, tangents = np.tile(y, (len(crossed), 1)), np.tile(t, (len(crossed), 1))
     lengths = find_zeros(
-        lambda r: step_along(curve, points, tangents, r)[0][range(len(k)), k] - limits[k], np.full(len(k), s)
+        lambda r: step_along(curve, points, tangents, r)[0][range(len(crossed)), crossed] - limits[crossed],
+        np.full(len(crossed), s),
     )
-    lengths = np.nan_to_num(lengths)  # nan: already outside
-    first = k[np.argmin(lengths)]
-    (last,), (tangent,) = step_along(curve, y[None], t[None], lengths.min(keepdims=True))
-    last[first] = limits[first]
-    return CurvePoint(last, tangent), End("max" if outer_point[first] > limits[first] else "min", int(first))
+    lengths = np.nan_to_num(lengths)  # a nan means that y is already outside
+    variable = crossed[np.argmin(lengths)]
+    (end_point,), (tangent,) = step_along(curve, y[None], t[None], lengths.min(keepdims=True))
+    end_point[variable] = limits[variable]
+    return CurvePoint(end_point, tangent), End(
+        "max" if outer_point[variable] > limits[variable] else "min", int(variable)
+    )

@@ -27,7 +27,7 @@ from tmsopt.tracing.trace import STARTS, STEP, trace
 _CORNER_DISTANCE = 5e-3
 """Largest distance, in widths of the box, from an end at infinity or a singular end to its corner."""
 
-_EDGE_DISTANCE = 1e-9  # largest distance, in widths of the box, of a branch from an edge in which it lies
+_EDGE_DISTANCE = 1e-9  # largest distance, in widths of the box, of a branch from an edge along which it runs
 
 _SIDE_OFFSET = 1e-4  # distance, in widths of the box, from a curve to the designs that test its two sides
 
@@ -59,7 +59,7 @@ class Corner:
 
 @dataclass(frozen=True, repr=False)
 class Domain(Printable):
-    """Boundaries inside a box. They end at the edges of the box. A boundary that lies in an edge is left out.
+    """Boundaries inside a box. They end at the edges of the box. A boundary that runs along an edge is left out.
 
     Attributes:
         stability: arcs that bound asymptotic stability.
@@ -103,67 +103,74 @@ def domain(
     More: docs/how_to/charts.md
     """
     plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
-    bounding = ("weave", "capsize", "EP2") if plane.model.carrier is None else ("weave",)
-    traces = (trace(plane, name, step=step, starts=starts, seed=seed, progress=progress) for name in bounding)
-    branches_of = {traced.pattern: [b for b in traced.branches if not _is_in_edge(b, plane)] for traced in traces}
+    pattern_names = ("weave", "capsize", "EP2") if plane.model.carrier is None else ("weave",)
+    traces = (trace(plane, name, step=step, starts=starts, seed=seed, progress=progress) for name in pattern_names)
+    branches_of = {t.pattern: [b for b in t.branches if not _lies_along_edge(b, plane)] for t in traces}
     start_steps(progress, "looking for corners")
-    infinite = list(find_infinity_curves(plane, step, starts, seed))
-    at_infinity = [c for curve in infinite for c in _list_changes(curve)]
+    infinity_curves = list(find_infinity_curves(plane, step, starts, seed))
+    infinity_corners = [c for curve in infinity_curves for c in _list_changes(curve)]
 
-    def arcs(names: Sequence[str], bounds: Callable[[Branch], Truth], side: str) -> tuple[Arc, ...]:
-        traced = (
-            arc for n in names for b in branches_of.get(n, ()) for arc in _cut_arcs(b, bounds(b), plane, at_infinity)
+    def arcs(names: Sequence[str], find_bounds: Callable[[Branch], Truth], attribute: str) -> tuple[Arc, ...]:
+        pattern_arcs = (
+            arc
+            for n in names
+            for b in branches_of.get(n, ())
+            for arc in _cut_arcs(b, find_bounds(b), plane, infinity_corners)
         )
-        runs = ((curve.parameters, run) for curve in infinite for run in _find_runs(getattr(curve, side)))
-        ends = (Arc("infinity", {n: x[start : stop + 1] for n, x in p.items()}) for p, (start, stop) in runs)
-        return (*traced, *ends)
+        runs = ((curve.parameters, run) for curve in infinity_curves for run in _find_runs(getattr(curve, attribute)))
+        infinity_arcs = (Arc("infinity", {n: x[start : stop + 1] for n, x in p.items()}) for p, (start, stop) in runs)
+        return (*pattern_arcs, *infinity_arcs)
 
     corners = [c for branches in branches_of.values() for b in branches for c in _list_corners(b, plane)]
-    corners += [c for curve in infinite for c in _list_changes(curve, corners=True)]
+    corners += [c for curve in infinity_curves for c in _list_changes(curve, only_corners=True)]
     return Domain(
         stability=arcs(("weave", "capsize"), lambda b: _bounds_stability(b, plane), "stable"),
-        heavy_damping=arcs(("EP2", "capsize"), lambda b: b.heavily_damped & _is_drawn_here(b), "heavily_damped"),
+        heavy_damping=arcs(
+            ("EP2", "capsize"), lambda b: b.heavily_damped & _has_larger_double_root(b), "heavily_damped"
+        ),
         parting=arcs(("EP2", "capsize"), _parts_instabilities, "parting"),
         corners=tuple(_merge_corners(corners)),
     )
 
 
-def _is_in_edge(branch: Branch, problem: Posed) -> bool:
-    """Whether a branch lies in an edge of the box, which bounds the domain anyway."""
+def _lies_along_edge(branch: Branch, problem: Posed) -> bool:
+    """Whether a branch runs along an edge of the box. The edge bounds the domain anyway."""
     limits = ((branch.parameters[n], limit, np.ptp(ends)) for n, ends in problem.free.items() for limit in ends)
     return any(np.abs(column - limit).max() <= _EDGE_DISTANCE * width for column, limit, width in limits)
 
 
 def _find_runs(is_inside: Truth) -> list[list[int]]:
-    """First index of each run of true values, and the index after its last one."""
+    """For each run of true values: its first index, and the index after its last value."""
     runs: list[list[int]] = np.flatnonzero(np.diff(is_inside.astype(int), prepend=0, append=0)).reshape(-1, 2).tolist()
     return runs
 
 
-def _list_changes(curve: InfinityCurve, corners: bool = False) -> Iterator[Corner]:
+def _list_changes(curve: InfinityCurve, only_corners: bool = False) -> Iterator[Corner]:
     """Points where another boundary meets the curve a0 = 0.
 
     Args:
-        corners: list only the points where a boundary of stability or of heavy damping changes.
+        only_corners: list only the points where a boundary of stability or of heavy damping changes.
     """
     for row, event in curve.changes.items():
-        if not corners or any(b[row - 1] != b[row] for b in (curve.stable, curve.heavily_damped)):
+        if not only_corners or any(b[row - 1] != b[row] for b in (curve.stable, curve.heavily_damped)):
             name, detail = (f"infinity and {event}", "a0 = 0") if event != "infinity" else ("infinity", "a0 = a1 = 0")
             yield Corner(name, detail, table_at(curve.parameters, row))
 
 
-def _cut_arcs(branch: Branch, is_inside: Truth, problem: Posed, at_infinity: Sequence[Corner]) -> Iterator[Arc]:
-    """Runs of points that bound a domain, with the events at their ends, and with a corner next to an end."""
+def _cut_arcs(branch: Branch, is_inside: Truth, problem: Posed, infinity_corners: Sequence[Corner]) -> Iterator[Arc]:
+    """An arc for each run of points that bound a domain, with the events and the corners at infinity at its ends."""
     is_bound, corner_at = is_inside.copy(), dict[int, Corner]()
     for event in branch.events:
         k = event.index
         if event.name != "end":
             is_bound[k] = bool(is_inside[max(k - 1, 0)] or is_inside[min(k + 1, len(branch) - 1)])
-        elif event.detail.startswith((INFINITE, SINGULAR)) and at_infinity:
+        elif event.detail.startswith((INFINITE, SINGULAR)) and infinity_corners:
             parameters, widths = event.parameters, {n: high - low for n, (low, high) in problem.free.items()}
-            distances = [max(abs(parameters[n] - c.parameters[n]) / w for n, w in widths.items()) for c in at_infinity]
+            distances = [
+                max(abs(parameters[n] - c.parameters[n]) / w for n, w in widths.items()) for c in infinity_corners
+            ]
             if min(distances) <= _CORNER_DISTANCE:
-                corner_at[k] = at_infinity[int(np.argmin(distances))]
+                corner_at[k] = infinity_corners[int(np.argmin(distances))]
     for start, stop in _find_runs(is_bound):
         if stop - start > 1:
             first_corner, last_corner = ([corner_at[k].parameters] if k in corner_at else [] for k in (start, stop - 1))
@@ -179,18 +186,18 @@ def _bounds_stability(branch: Branch, problem: Posed) -> Truth:
     other_factors = pattern_of(problem.model, branch.pattern).remaining_factors(list(branch.unknowns.values()))
     z = roots_along(other_factors, len(branch))
     # squared frequency of the fastest pair on the axis
-    axis_frequency = np.where(is_on_axis(z), np.abs(z) ** 2, -1.0).max(axis=-1, initial=-1.0)
-    if np.all(axis_frequency < 0):
+    squared_frequency = np.where(is_on_axis(z), np.abs(z) ** 2, -1.0).max(axis=-1, initial=-1.0)
+    if np.all(squared_frequency < 0):
         return branch.stable
     (x, dx, x_width), (y, dy, y_width) = (
-        (branch.parameters[n], branch.tangent[n] / (end - low), end - low) for n, (low, end) in problem.free.items()
+        (branch.parameters[n], branch.tangent[n] / (high - low), high - low) for n, (low, high) in problem.free.items()
     )
     offset = np.array([[-_SIDE_OFFSET], [_SIDE_OFFSET]]) / (np.hypot(dx, dy) + 1e-300)
-    sides = dict(zip(problem.free, (x - offset * x_width * dy, y + offset * y_width * dx), strict=True))
-    with np.errstate(all="ignore"):  # outside the model's range nan is not stable
-        stable_on_left, stable_on_right = is_stable(compute_coefficients(problem, sides))
-    fastest = (axis_frequency >= 0) & (branch.unknowns.get("W", np.inf) >= axis_frequency)
-    return np.asarray(branch.stable | (fastest & (stable_on_left != stable_on_right)))
+    side_designs = dict(zip(problem.free, (x - offset * x_width * dy, y + offset * y_width * dx), strict=True))
+    with np.errstate(all="ignore"):  # nan, outside the range of the model, is not stable
+        stable_on_left, stable_on_right = is_stable(compute_coefficients(problem, side_designs))
+    is_fastest = (squared_frequency >= 0) & (branch.unknowns.get("W", np.inf) >= squared_frequency)
+    return np.asarray(branch.stable | (is_fastest & (stable_on_left != stable_on_right)))
 
 
 def _parts_instabilities(branch: Branch) -> Truth:
@@ -198,7 +205,8 @@ def _parts_instabilities(branch: Branch) -> Truth:
     other_factor = _find_other_factor(branch)
     is_parting = branch.unknowns["r"] > 0 if branch.pattern == "EP2" else ~branch.stable
     if len(other_factor) > 1:
-        is_parting[is_parting] = real_roots(np.stack(other_factor, axis=-1)[is_parting])[1] == 0
+        _, positive_count = real_roots(np.stack(other_factor, axis=-1)[is_parting])
+        is_parting[is_parting] = positive_count == 0
     return is_parting
 
 
@@ -207,8 +215,8 @@ def _find_other_factor(branch: Branch) -> list[Any]:
     return [np.ones(len(branch)), *(column for name, column in branch.unknowns.items() if name != "r")]
 
 
-def _is_drawn_here(branch: Branch) -> Truth:
-    """Where r is the larger of two double roots; with the smaller one, the same curve would be drawn twice."""
+def _has_larger_double_root(branch: Branch) -> Truth:
+    """Where r is the larger of two double roots. With the smaller one as r, the same curve would be drawn twice."""
     if not np.any(branch.kinds == "2EP2"):
         return np.ones(len(branch), dtype=bool)
     r, second_root = branch.unknowns["r"], nearest_pair_mean(_find_other_factor(branch))
@@ -216,25 +224,25 @@ def _is_drawn_here(branch: Branch) -> Truth:
 
 
 def _list_corners(branch: Branch, problem: Posed) -> Iterator[Corner]:
-    """Events where a boundary of a domain turns, crosses another or ends inside the box."""
+    """Events where a boundary of a domain turns, crosses another boundary or ends inside the box."""
     is_inside = branch.heavily_damped if branch.pattern == "EP2" else branch.stable
     ends = pattern_of(problem.model, branch.pattern).ends.values()
     for event in branch.events:
-        turns = event.detail in ends if event.name == "end" else event.name not in ("fold", "constraint")
-        if turns and np.any(is_inside[max(event.index - 1, 0) : event.index + 2]):
+        is_corner = event.detail in ends if event.name == "end" else event.name not in ("fold", "constraint")
+        if is_corner and np.any(is_inside[max(event.index - 1, 0) : event.index + 2]):
             name = "double zero" if event.name == "end" else event.name
             yield Corner(name, event.detail, {n: event.parameters[n] for n in problem.free})
 
 
 def _merge_corners(corners: Sequence[Corner]) -> list[Corner]:
-    """Each place once, with all its names: where a weave arc meets a capsize arc, both have a corner."""
-    merged: list[Corner] = []
+    """Each corner once, with all its names. For example, a weave arc and a capsize arc may have the same corner."""
+    merged_corners: list[Corner] = []
     for corner in corners:
-        for k, earlier in enumerate(merged):
+        for k, earlier in enumerate(merged_corners):
             if np.allclose(list(corner.parameters.values()), list(earlier.parameters.values()), rtol=1e-7, atol=1e-9):
                 names = dict.fromkeys([*earlier.name.split(" and "), *corner.name.split(" and ")])
-                merged[k] = replace(earlier, name=" and ".join(names))
+                merged_corners[k] = replace(earlier, name=" and ".join(names))
                 break
         else:
-            merged.append(corner)
-    return merged
+            merged_corners.append(corner)
+    return merged_corners

@@ -21,23 +21,23 @@ from tmsopt.tracing.continuation import Curve, compile_curve
 from tmsopt.tracing.solving import map_rows
 
 _SAMPLE_SIZE = 32  # designs from which sizes of the unknowns are estimated
-_MIN_LEADING = 1e-9
+_MIN_LEADING = 1e-9  # smallest a0, relative to the largest coefficient, that is not negligible
 
 
 def compute_coefficients(problem: Posed, columns: Mapping[str, Array]) -> Array:
-    """Coefficients of the designs given by columns of the free parameters, shape (designs, n + 1)."""
+    """Coefficients of many designs, shape (designs, n + 1); `columns`: free parameter → its values."""
     a = np.broadcast_arrays(*coefficients_of(problem, problem.ordered(columns)), next(iter(columns.values())))[:-1]
     return np.stack(a, axis=-1).astype(float)
 
 
 @dataclass(frozen=True)
-class TracedProblem:
-    """A problem prepared for tracing one pattern.
+class TracingSetup:
+    """All that is needed to trace one pattern of a problem.
 
     Attributes:
         problem: the problem, which has the pattern to locate and every constraint.
-        unit: units of the variables of the NLP, in natural units.
-        unknowns: indices of the pattern's unknowns among the variables.
+        unit: unit that the NLP has for each variable, in natural units.
+        unknown_columns: indices of the pattern's unknowns among the variables.
     """
 
     problem: Posed
@@ -45,10 +45,10 @@ class TracedProblem:
     nlp: NLP
     curve: Curve
     unit: Array
-    unknowns: slice
+    unknown_columns: slice
 
     def has_leading_coefficient(self, a: Array) -> Truth:
-        """Whether a0 is not negligible, for a of shape (…, n + 1). If all coefficients are 0, any factors fit."""
+        """Whether a0 is not negligible, for a of shape (…, n + 1). If all coefficients vanish, any factors fit them."""
         size = np.abs(a) / self.nlp.unit ** np.arange(a.shape[-1])
         return np.asarray(size[..., 0] > _MIN_LEADING * size.max(axis=-1))
 
@@ -62,13 +62,14 @@ class TracedProblem:
         return sorted(points, key=lambda y: best_first and np.abs(map_rows(self.curve.evaluate, y[None])[0]).max())
 
 
-def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracedProblem:
+def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracingSetup:
     """Compile the equations of a pattern; by default the pattern that the problem locates."""
-    pattern, free = pattern or pattern_of(problem.model, str(problem.locate)), len(problem.free)
+    pattern, free_count = pattern or pattern_of(problem.model, str(problem.locate)), len(problem.free)
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
     nlp = formulate_matching(problem.derive(constraints=equalities), pattern)
-    unit, unknowns = np.ones(len(nlp.variables)), slice(free, free + len(pattern.unknowns))
-    unit[unknowns] = np.array([nlp.unit**power for power in pattern.powers])  # of the NLP; x has natural units
+    unit, unknown_columns = np.ones(len(nlp.variables)), slice(free_count, free_count + len(pattern.unknowns))
+    # the NLP has units of its own; x has natural units
+    unit[unknown_columns] = np.array([nlp.unit**power for power in pattern.powers])
     x = ca.SX.sym("x", len(unit))
     g = nlp.symbolic(x / ca.DM(unit))[1]
     rows = [g[k] for k in range(len(nlp.rows)) if nlp.row_lower[k] == nlp.row_upper[k]]
@@ -79,16 +80,16 @@ def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracedPro
     lower, upper = np.array(nlp.lower), np.array(nlp.upper)
     for k, name in enumerate(pattern.unknowns):
         if name in pattern.ends:
-            lower[free + k] = 0.0
+            lower[free_count + k] = 0.0
     scale = unit.copy()
-    scale[:free] = upper[:free] - lower[:free]
+    scale[:free_count] = upper[:free_count] - lower[:free_count]
     sample = (
         next(complete_starts(nlp, problem, design), None) for design in islice(sample_box(problem, 0), _SAMPLE_SIZE)
     )
     if guesses := [guess for guess in sample if guess is not None]:
-        scale[free:] = (unit * np.clip(np.median(np.abs(guesses), axis=0), 0.1, 1e3))[free:]
-    return TracedProblem(
-        problem, pattern, nlp, compile_curve(x, ca.vertcat(*rows), scale, lower, upper), unit, unknowns
+        scale[free_count:] = (unit * np.clip(np.median(np.abs(guesses), axis=0), 0.1, 1e3))[free_count:]
+    return TracingSetup(
+        problem, pattern, nlp, compile_curve(x, ca.vertcat(*rows), scale, lower, upper), unit, unknown_columns
     )
 
 

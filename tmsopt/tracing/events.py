@@ -16,14 +16,14 @@ from tmsopt.errors import Fault, InputError, input_error, is_number, list_faults
 from tmsopt.records import Array, Truth
 from tmsopt.roots.sign_tests import nearest_pair_mean
 from tmsopt.tracing.continuation import Curve, Walk, step_along
-from tmsopt.tracing.equations import TracedProblem
-from tmsopt.tracing.points import NOTHING, Points, axis_functions
+from tmsopt.tracing.equations import TracingSetup
+from tmsopt.tracing.points import ZERO_TOLERANCE, Points, axis_functions
 from tmsopt.tracing.solving import find_zeros
 
 SAME_PLACE = 1e-6
 """Distance, in units of the scale, up to which events are at one place; each is located to 1e-12 or better."""
 
-CHANGES = "stability changes"
+STABILITY_CHANGES = "stability changes"
 """Detail of weave and capsize events, which are listed only where stability changes."""
 
 _PACKAGE_NAMES = (
@@ -31,7 +31,7 @@ _PACKAGE_NAMES = (
 )
 _MIN_DIP = 0.5
 """A minimum between two steps is searched if a parabola predicts a fall by at least this share of the value."""
-_MAX_DEVIATION = 2.0  # in arclengths; a point farther away lies on another curve, as may happen near a singular point
+_MAX_DEVIATION = 2.0  # largest distance of a zero from its row, in arclengths; a zero farther away is on another curve
 _ROUNDING = 1e-14  # rounding error of a variable of order 1
 
 
@@ -65,7 +65,7 @@ class Event:
 
 @dataclass(frozen=True)
 class LocatedEvent:
-    """A zero of an event at an arclength s after a row of a walk."""
+    """A zero of an event: the point y and its tangent t, at an arclength s after a row of a walk."""
 
     event: Event
     y: Array
@@ -75,11 +75,11 @@ class LocatedEvent:
 
 
 def check_events(events: Any) -> list[Event]:
-    """The events of a user as functions of many `Points`, as the events of the package are.
+    """Convert the functions of a user's events to functions of many `Points`, as in the events of the package.
 
     Raises:
-        InputError: if this is no list of events. Later, the functions raise it if a user's function raises or returns
-            no finite number.
+        InputError: if `events` is not a list of events. The converted functions raise it if a user's function raises
+            an exception or returns something other than a finite number.
     """
     faults = list_faults("events", events, "[tmsopt.Event('Fr is 3', lambda p: p['Fr'] - 3)]")
     for k, event in enumerate(() if faults else events):
@@ -110,12 +110,12 @@ def _evaluate_at(event: Event, point: Mapping[str, float]) -> float:
         value = event.function(point)
         if is_number(value):
             return float(value)
-        problem_text = f"the function returns {short(value)}"
+        cause = f"the function returns {short(value)}"
     except Exception as error:
-        problem_text = f"the function raises {type(error).__name__}: {error}"
-    place = ", ".join(f"{name} = {point[name]:.6g}" for name in point)
+        cause = f"the function raises {type(error).__name__}: {error}"
+    point_text = ", ".join(f"{name} = {point[name]:.6g}" for name in point)
     raise input_error(
-        f"{problem_text} at {place}; accepted: a finite number at every point of the curve", "events", event.name
+        f"{cause} at {point_text}; accepted: a finite number at every point of the curve", "events", event.name
     )
 
 
@@ -132,43 +132,45 @@ class _PointView(Mapping[str, float]):
         return float(self.points[name][self.row])
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.points.traced.problem.free)
+        return iter(self.points.setup.problem.free)
 
     def __len__(self) -> int:
-        return len(self.points.traced.problem.free)
+        return len(self.points.setup.problem.free)
 
 
 def list_package_events(points: Points) -> Iterator[Event]:
     """All events that the package locates along a curve."""
-    problem, pattern = points.traced.problem, points.traced.pattern
+    problem, pattern = points.setup.problem, points.setup.pattern
 
-    def margin(number: int, k: int, points: Points) -> Any:
-        return axis_functions(pattern.remaining_factors(points.unknowns)[number])[k]
+    def evaluate_axis_function(factor_index: int, k: int, points: Points) -> Any:
+        return axis_functions(pattern.remaining_factors(points.unknowns)[factor_index])[k]
 
     for name in pattern.marks:
         yield Event(name, partial(Points.mark, name=name))
-    if pattern.form == "EP2" and "2EP2" in points.special:
+    if pattern.form == "EP2" and "2EP2" in points.special_cases:
         yield Event("EP4", lambda p: p.unknowns[0] - nearest_pair_mean(pattern.factors(p.unknowns)[-1]))
-    for number, factor in enumerate(pattern.remaining_factors(points.unknowns)):
+    for factor_index, factor in enumerate(pattern.remaining_factors(points.unknowns)):
         for k in range(len(axis_functions(factor))):  # the first function is the constant term
-            yield Event("weave" if k else "capsize", partial(margin, number, k), detail=CHANGES)
+            yield Event(
+                "weave" if k else "capsize", partial(evaluate_axis_function, factor_index, k), detail=STABILITY_CHANGES
+            )
     for k, parameter in enumerate(problem.free):
-        # per arclength of the parameters, since the unknowns may move much faster
+        # derivative by the arclength of the parameters, since the unknowns may move much faster
         yield Event("fold", partial(lambda k, p: p.t[:, k] / (p.speed + 1e-300), k), detail=parameter)
     for name, condition in problem.conditions.items():
         if not condition.equality:
             yield Event("constraint", partial(lambda c, p: c(p.values), condition), detail=name)
 
 
-def locate_events(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Iterator[LocatedEvent]:
+def locate_events(setup: TracingSetup, walk: Walk, events: Sequence[Event] = ()) -> Iterator[LocatedEvent]:
     """Every zero of an event between two rows at which its function has different signs."""
-    points, free = Points(traced, walk.y, walk.t), list(traced.problem.free)
+    points, free_names = Points(setup, walk.y, walk.t), list(setup.problem.free)
     for event, values in _list_active(points, events):
-        for located in locate_zeros(traced.curve, walk, partial(Points, traced), event, values):
-            y, row = located.y, located.row
-            changes = event.name not in ("weave", "capsize") or points.stable[row] != points.stable[row + 1]
-            if changes and (event.name != "fold" or _is_fold(walk, row, y, free.index(event.detail))):
-                yield located
+        for located_event in locate_zeros(setup.curve, walk, partial(Points, setup), event, values):
+            y, row = located_event.y, located_event.row
+            has_change = event.name not in ("weave", "capsize") or points.stable[row] != points.stable[row + 1]
+            if has_change and (event.name != "fold" or _is_fold(walk, row, y, free_names.index(event.detail))):
+                yield located_event
 
 
 def locate_zeros(
@@ -180,96 +182,103 @@ def locate_zeros(
     ends = np.sum(tangents * (walk.y[rows + 1] - points), axis=1)
     if rows.size:
         s = find_zeros(lambda s: event.function(make_points(*step_along(curve, points, tangents, s))), ends)
-        real = np.isfinite(s)  # otherwise the sign changes at a pole, by noise, or at nan
+        is_zero = np.isfinite(s)  # otherwise the sign changes at a pole, by noise, or at nan
         zeros = zip(
-            *step_along(curve, points[real], tangents[real], s[real]),
-            rows[real].tolist(),
-            s[real].tolist(),
+            *step_along(curve, points[is_zero], tangents[is_zero], s[is_zero]),
+            rows[is_zero].tolist(),
+            s[is_zero].tolist(),
             strict=True,
         )
         for y, t, row, length in zeros:
-            if (
-                np.abs(y - walk.y[row]).max() <= _MAX_DEVIATION * length + SAME_PLACE
-            ):  # otherwise it is on another curve
+            # a zero farther away is on another curve
+            if np.abs(y - walk.y[row]).max() <= _MAX_DEVIATION * length + SAME_PLACE:
                 yield LocatedEvent(event, y, t, row, length)
 
 
 def has_sign_change(value: Array) -> Truth:
-    """Where a sequence changes sign from an entry to the next. A 0 takes the sign before it, or the sign after it."""
+    """Whether a sequence changes sign from each entry to the next.
+
+    A 0 has the sign of the last entry before it that is not 0. Without such an entry, it has the sign after it.
+    """
     sign = np.sign(value)
     if (nonzero := np.flatnonzero(sign)).size:
         sign = sign[nonzero[np.maximum(np.searchsorted(nonzero, range(len(sign)), side="right") - 1, 0)]]
     return sign[1:] * sign[:-1] < 0
 
 
-def refine_walk(traced: TracedProblem, walk: Walk, events: Sequence[Event] = ()) -> Walk:
-    """The walk with added points where an event is nearest to 0 between two steps.
+def refine_walk(setup: TracingSetup, walk: Walk, events: Sequence[Event] = ()) -> Walk:
+    """The walk with additional points where the function of an event is nearest to 0 between two steps.
 
     Without these points, two zeros between two steps would show no change of sign.
     """
     steps = np.sum(walk.t[:-1] * np.diff(walk.y, axis=0), axis=1)
     step_before, step_after = steps[:-1], steps[1:]
     minima: dict[tuple[int, float], LocatedEvent] = {}
-    for event, value in _list_active(Points(traced, walk.y, walk.t), events):
-        side = np.sign(value[1:-1])
-        value_before, value_here, value_after = side * value[:-2], side * value[1:-1], side * value[2:]
+    for event, value in _list_active(Points(setup, walk.y, walk.t), events):
+        sign = np.sign(value[1:-1])
+        value_before, value_here, value_after = sign * value[:-2], sign * value[1:-1], sign * value[2:]
         with np.errstate(all="ignore"):  # slope and second derivative of the parabola through three values
             slope_before = (value_here - value_before) / step_before
             slope_after = (value_after - value_here) / step_after
             slope = (slope_before * step_after + slope_after * step_before) / (step_before + step_after)
-            bend = 2 * (slope_after - slope_before) / (step_before + step_after)
-            dips = (
+            second_derivative = 2 * (slope_after - slope_before) / (step_before + step_after)
+            is_dip = (
                 (value_here <= value_before)
                 & (value_here <= value_after)
-                & (bend > 0)
-                & (slope**2 / (2 * bend) > _MIN_DIP * value_here)
+                & (second_derivative > 0)
+                & (slope**2 / (2 * second_derivative) > _MIN_DIP * value_here)
             )
-        for k in np.flatnonzero(dips & (step_before > 0) & (step_after > 0) & (value_here > 0)).tolist():
-            row = walk.y[[k + 1]], walk.t[[k + 1]]
+        for k in np.flatnonzero(is_dip & (step_before > 0) & (step_after > 0) & (value_here > 0)).tolist():
+            point = walk.y[[k + 1]], walk.t[[k + 1]]
 
-            def height(s: float, event: Event = event, row: tuple[Array, Array] = row, sign: float = side[k]) -> float:
-                return sign * float(event.function(Points(traced, *step_along(traced.curve, *row, np.array([s]))))[0])
+            def height(
+                s: float, event: Event = event, point: tuple[Array, Array] = point, sign_here: float = sign[k]
+            ) -> float:
+                points = Points(setup, *step_along(setup.curve, *point, np.array([s])))
+                return sign_here * float(event.function(points)[0])
 
             from scipy.optimize import minimize_scalar  # importing it takes 0.2 s
 
             minimum = minimize_scalar(
                 height, bounds=(-step_before[k], step_after[k]), method="bounded", options={"xatol": 1e-14}
             )
-            s, nearby = float(minimum.x), step_along(traced.curve, *row, np.array([minimum.x]))
+            s, minimum_point = float(minimum.x), step_along(setup.curve, *point, np.array([minimum.x]))
             # correct the point again, since Newton's method converges slowly near singular points
-            (y,), (t,) = step_along(traced.curve, *nearby, np.zeros(1))
-            if np.abs(y - row[0][0]).max() <= _MAX_DEVIATION * abs(s) and t @ row[1][0] > 0:
-                place = (k + 1, s) if s >= 0 else (k, step_before[k] + s)
-                minima.setdefault(place, LocatedEvent(event, y, t, *place))
-    return insert_events(walk, [minima[place] for place in sorted(minima)])[1]
+            (y,), (t,) = step_along(setup.curve, *minimum_point, np.zeros(1))
+            if np.abs(y - walk.y[k + 1]).max() <= _MAX_DEVIATION * abs(s) and t @ walk.t[k + 1] > 0:
+                row_and_s = (k + 1, s) if s >= 0 else (k, step_before[k] + s)
+                minima.setdefault(row_and_s, LocatedEvent(event, y, t, *row_and_s))
+    _, refined_walk = insert_events(walk, [minima[key] for key in sorted(minima)])
+    return refined_walk
 
 
-def insert_events(walk: Walk, located: Sequence[LocatedEvent]) -> tuple[list[int], Walk]:
-    """The rows of the events, in order, and the walk with them among its points."""
-    order = np.argsort([*range(len(walk.y)), *(f.row + 0.5 for f in located)], kind="stable")
-    y, t = np.array([*walk.y, *(f.y for f in located)]), np.array([*walk.t, *(f.t for f in located)])
+def insert_events(walk: Walk, located_events: Sequence[LocatedEvent]) -> tuple[list[int], Walk]:
+    """Return the rows of the events, in ascending order, and the walk with the events among its points."""
+    order = np.argsort([*range(len(walk.y)), *(f.row + 0.5 for f in located_events)], kind="stable")
+    y, t = np.array([*walk.y, *(f.y for f in located_events)]), np.array([*walk.t, *(f.t for f in located_events)])
     return np.flatnonzero(order >= len(walk.y)).tolist(), replace(walk, y=y[order], t=t[order])
 
 
 def _list_active(points: Points, events: Iterable[Event]) -> Iterator[tuple[Event, Array]]:
-    """The events whose functions are not 0 all along the curve, with their values."""
-    special_names = points.special
+    """The events whose functions are not 0 along the whole curve, with their values at the points."""
+    special_cases = points.special_cases
     for event in (*list_package_events(points), *events):
         value = points.column(event.function(points))
-        if event.name not in special_names and (event.name != "fold" or np.abs(value).max() > NOTHING):
+        if event.name not in special_cases and (event.name != "fold" or np.abs(value).max() > ZERO_TOLERANCE):
             yield event, value
 
 
-def _is_fold(walk: Walk, i: int, y: Array, k: int) -> bool:
-    """Whether the next points, or the points after them, are on the same side of y by more than rounding errors.
+def _is_fold(walk: Walk, row: int, y: Array, variable: int) -> bool:
+    """Whether a variable turns back at a point y between a row and the next.
 
-    Where the equations are singular, the tangent alone is not reliable.
+    It turns back if its values before and after y lie on the same side of its value at y, by more than rounding errors.
+    The tangent alone does not show this reliably where the equations are singular.
     """
-    rows = np.clip([[i, i - 1], [i + 1, i + 2]], 0, len(walk.y) - 1)
-    offset_before, offset_after = walk.y[rows, k] - y[k]
+    rows = np.clip([[row, row - 1], [row + 1, row + 2]], 0, len(walk.y) - 1)
+    offset_before, offset_after = walk.y[rows, variable] - y[variable]
     return bool(
         np.any(
             (offset_before * offset_after > 0)
-            & (np.minimum(abs(offset_before), abs(offset_after)) > _ROUNDING * (1 + abs(y[k])))
+            & (np.minimum(abs(offset_before), abs(offset_after)) > _ROUNDING * (1 + abs(y[variable])))
         )
     )

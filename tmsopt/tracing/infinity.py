@@ -24,11 +24,11 @@ from tmsopt.tracing.continuation import Curve, Walk, compile_curve
 from tmsopt.tracing.equations import design_at, limits_of
 from tmsopt.tracing.events import Event, LocatedEvent, insert_events, locate_zeros
 from tmsopt.tracing.points import axis_functions
-from tmsopt.tracing.seeds import find_unexplained, walk_new_curves
+from tmsopt.tracing.seeds import find_missed_designs, walk_new_curves
 from tmsopt.tracing.solving import map_rows, project_rows
 
-_ZERO_TERM = 1e-12  # share of the largest coefficient; a constant term below it along the whole curve vanishes with a0
-_MAX_POINTS = 10**6
+_ZERO_TERM = 1e-12  # largest constant term, as a share of the largest coefficient, that vanishes together with a0
+_MAX_POINTS = 10**6  # largest number of points of a curve in one direction
 
 
 @dataclass(frozen=True)
@@ -64,22 +64,22 @@ def find_infinity_curves(problem: Posed, step: float, starts: int, seed: int) ->
     alignment = ca.dot(ca.gradient(a[0], x), ca.gradient(ca.SX(a[-1]), x))
     other_coefficients = ca.Function("rest", [x], [ca.densify(ca.vertcat(*a[1:], alignment))])
     walks: list[Walk] = []
-    walk_new_curves(curve, _find_points(problem, curve, starts, seed, walks), (step, _MAX_POINTS), walks)
+    walk_new_curves(curve, _find_points(problem, curve, starts, seed, walks), step, _MAX_POINTS, walks)
     yield from (_describe_curve(problem, curve, walk, other_coefficients) for walk in walks)
 
 
 def _find_points(problem: Posed, curve: Curve, starts: int, seed: int, walks: Sequence[Walk]) -> Iterator[Array]:
     """Points of the curve in the box: first from designs all over the box, then from a grid, away from known curves."""
-    spots = list(islice(sample_box(problem, seed), starts))
-    unexplained = ([d] for d in find_unexplained(problem, curve, lambda a: a[0], walks))
-    for designs in chain([spots] if spots else [], unexplained):
-        at = np.array([variables_of(problem, d) for d in designs]) / curve.scale
-        y = project_rows(curve.evaluate, at, [k % 2 for k in range(len(at))])
-        yield y[np.all((curve.lower <= y) & (y <= curve.upper), axis=1)]  # never for nan
+    sample = list(islice(sample_box(problem, seed), starts))
+    missed = ([d] for d in find_missed_designs(problem, curve, lambda a: a[0], walks))
+    for designs in chain([sample] if sample else [], missed):
+        points = np.array([variables_of(problem, d) for d in designs]) / curve.scale
+        y = project_rows(curve.evaluate, points, [k % 2 for k in range(len(points))])
+        yield y[np.all((curve.lower <= y) & (y <= curve.upper), axis=1)]  # false for nan
 
 
 def _describe_curve(problem: Posed, curve: Curve, walk: Walk, other_coefficients: ca.Function) -> InfinityCurve:
-    """The curve with every change among its points."""
+    """Describe a walk along a0 = 0, with every change of the other roots among its points."""
 
     def values(y: Array) -> Array:
         return map_rows(other_coefficients, y * curve.scale)[0]
@@ -94,16 +94,16 @@ def _describe_curve(problem: Posed, curve: Curve, walk: Walk, other_coefficients
 
     size = np.abs(values(walk.y)[:, :-1])
     constant_vanishes = bool(np.all(size[:, -1] <= _ZERO_TERM * size.max(axis=1)))
-    located: list[LocatedEvent] = []
+    located_events: list[LocatedEvent] = []
     for k, (name, column) in enumerate(tests(walk.y)):
         event = Event(name, partial(lambda k, tested: tested[k][1], k))
-        located += locate_zeros(curve, walk, lambda y, t: tests(y), event, column)
-    located.sort(key=lambda f: (f.row, f.s, f.event.name))
-    rows, walk = insert_events(walk, located)
+        located_events += locate_zeros(curve, walk, lambda y, t: tests(y), event, column)
+    located_events.sort(key=lambda f: (f.row, f.s, f.event.name))
+    rows, walk = insert_events(walk, located_events)
     is_distinct = np.append(True, np.any(np.diff(walk.y, axis=0) != 0, axis=1))  # a zero may be at a point of the walk
-    points, numbers = walk.y[is_distinct], (np.cumsum(is_distinct) - 1)[rows].tolist()
+    points, event_rows = walk.y[is_distinct], (np.cumsum(is_distinct) - 1)[rows].tolist()
     bounds = _classify_segments(values((points[1:] + points[:-1]) / 2), constant_vanishes)
-    row_events = zip(numbers, [f.event.name for f in located], strict=True)
+    row_events = zip(event_rows, [f.event.name for f in located_events], strict=True)
     changes = {row: name for row, name in row_events if any(b[row - 1] != b[row] for b in bounds)}
     return InfinityCurve(design_at(problem, points * curve.scale), *bounds, changes)
 
@@ -120,7 +120,7 @@ def _classify_segments(v: Array, constant_vanishes: bool) -> tuple[Truth, Truth,
     if constant_vanishes:
         is_proper &= v[:, -1] > 0
     stable[is_proper] = is_stable(c[is_proper])
-    negative, positive = real_roots(c[is_proper])
-    damped[is_proper] = stable[is_proper] & (negative == c.shape[1] - 1)
-    parting[is_proper] = ~stable[is_proper] & (positive == 0)
+    negative_count, positive_count = real_roots(c[is_proper])
+    damped[is_proper] = stable[is_proper] & (negative_count == c.shape[1] - 1)
+    parting[is_proper] = ~stable[is_proper] & (positive_count == 0)
     return stable, damped, parting

@@ -13,21 +13,20 @@ from tmsopt.roots import lienard_chipart, roots
 from tmsopt.roots.patterns.pattern import mean_size
 from tmsopt.roots.sign_tests import CLOSED, opposite_roots_test
 from tmsopt.tracing.branch import name_unknowns
-from tmsopt.tracing.equations import TracedProblem, design_at
+from tmsopt.tracing.equations import TracingSetup, design_at
 
-NOTHING = 1e-9  # a function below this value along the whole curve counts as 0
+ZERO_TOLERANCE = 1e-9  # a function below this value along the whole curve counts as 0
 
 _ROUNDING = 1e-14  # relative; a few rounding errors
-_REAL_TOLERANCE = (
-    1e-6  # imaginary part of a real root, relative to |s|: rounding of 1e-15 moves double roots by its square root
-)
+_REAL_TOLERANCE = 1e-6
+"""Largest |Im s| / |s| of a root that counts as real. A rounding error moves a double root by its square root."""
 
 
 @dataclass(frozen=True)
 class Points:
     """Points y of a traced curve, in units of its scale, and its tangents t, both of shape (n, variables)."""
 
-    traced: TracedProblem
+    setup: TracingSetup
     y: Array
     t: Array
 
@@ -37,30 +36,30 @@ class Points:
     @cached_property
     def x(self) -> Array:
         """The points in natural units."""
-        return self.y * self.traced.curve.scale
+        return self.y * self.setup.curve.scale
 
     @property
     def unknowns(self) -> list[Array]:
         """The unknowns of the pattern, shape (n,) each."""
-        return list(self.x[:, self.traced.unknowns].T)
+        return list(self.x[:, self.setup.unknown_columns].T)
 
     @property
     def speed(self) -> Array:
         """Speed of the free parameters along the curve, in units of the scale."""
-        return np.asarray(np.linalg.norm(self.t[:, : len(self.traced.problem.free)], axis=1))
+        return np.asarray(np.linalg.norm(self.t[:, : len(self.setup.problem.free)], axis=1))
 
     @cached_property
     def parameters(self) -> dict[str, Array]:
         """Every parameter of the problem, shape (n,) each."""
-        problem = self.traced.problem
+        problem = self.setup.problem
         free = {n: _clip_rounding(v, *problem.free[n]) for n, v in design_at(problem, self.x).items()}
         return {n: np.array(np.broadcast_to(v, len(self)), dtype=float) for n, v in problem.ordered(free).items()}
 
     @cached_property
     def values(self) -> Values:
-        """Quantities of the points. Those of the roots come from the factors, in which multiple roots are exact."""
-        z = roots_along(self.traced.pattern.factors(self.unknowns), len(self))
-        problem = self.traced.problem
+        """Quantities of the points. Roots are computed from the factors, whose multiple roots are exact."""
+        z = roots_along(self.setup.pattern.factors(self.unknowns), len(self))
+        problem = self.setup.problem
         return Values(problem.model, problem.parameter_set, self.parameters, extra=(NO_RADIUS,)).with_known(
             {
                 "abscissa": z.real.max(axis=-1),
@@ -81,34 +80,34 @@ class Points:
     @cached_property
     def named_unknowns(self) -> dict[str, Array]:
         """The unknowns by name."""
-        pattern = self.traced.pattern
+        pattern = self.setup.pattern
         return name_unknowns(pattern.name, dict(zip(pattern.unknowns, self.unknowns, strict=True)), self.parameters)
 
     @cached_property
     def stable(self) -> Truth:
         """Where all other roots are left of the imaginary axis by more than rounding errors."""
-        return np.asarray(np.all(self._others.real < -_ROUNDING * np.abs(self._others), axis=-1))
+        return np.asarray(np.all(self._other_roots.real < -_ROUNDING * np.abs(self._other_roots), axis=-1))
 
     @property
     def heavily_damped(self) -> Truth:
         """Where all roots are real, and those that the pattern leaves free are negative."""
-        real = np.all(np.abs(self._others.imag) <= _REAL_TOLERANCE * np.abs(self._others), axis=-1)
-        return np.asarray(self.stable & real & ("W" not in self.traced.pattern.unknowns))
+        is_real = np.all(np.abs(self._other_roots.imag) <= _REAL_TOLERANCE * np.abs(self._other_roots), axis=-1)
+        return np.asarray(self.stable & is_real & ("W" not in self.setup.pattern.unknowns))
 
     @property
     def satisfied(self) -> Truth:
         """Where every inequality constraint holds."""
-        limits = [c for c in self.traced.problem.conditions.values() if not c.equality]
+        limits = [c for c in self.setup.problem.conditions.values() if not c.equality]
         conditions_hold = [self.column(True), *(c.holds(self.column(c(self.values))) for c in limits)]
         return np.asarray(np.all(conditions_hold, axis=0))
 
     @property
     def residual(self) -> Array:
         """Largest mismatch of a coefficient, relative to its terms."""
-        monic = self.traced.pattern.monic(self.unknowns)
+        monic = self.setup.pattern.monic(self.unknowns)
         a0 = self.column(self.values.coefficients[0])
         unit = self.column(mean_size(monic))
-        unit = np.maximum(unit, np.median(unit)) + 1e-300  # near roots 0, use the unit of the whole curve
+        unit = np.maximum(unit, np.median(unit)) + 1e-300  # where all roots are near 0, use the unit of the whole curve
         pairs = enumerate(zip(self.values.coefficients, monic, strict=True))
         terms = [(a - a0 * c, np.abs(a) + np.abs(a0 * c) + np.abs(a0) * unit**k) for k, (a, c) in pairs]
         # a size is 0 if all roots are 0
@@ -117,13 +116,13 @@ class Points:
         )
 
     @property
-    def special(self) -> list[str]:
+    def special_cases(self) -> list[str]:
         """Special cases of the pattern that hold along the whole curve, up to rounding."""
-        return [name for name in self.traced.pattern.marks if np.median(np.abs(self.mark(name))) <= NOTHING]
+        return [name for name in self.setup.pattern.marks if np.median(np.abs(self.mark(name))) <= ZERO_TOLERANCE]
 
     def mark(self, name: str) -> Array:
-        """The function that vanishes at a special case of the pattern."""
-        pattern = self.traced.pattern
+        """Values of the function that vanishes at a special case of the pattern."""
+        pattern = self.setup.pattern
         return self.column(pattern.marks[name](pattern.scaled_unknowns(self.unknowns)))
 
     def column(self, value: Any) -> Array:
@@ -131,15 +130,15 @@ class Points:
         return np.broadcast_to(np.asarray(value, dtype=float), len(self))
 
     @cached_property
-    def _others(self) -> Complex:
+    def _other_roots(self) -> Complex:
         """The roots that the pattern leaves free."""
-        return roots_along(self.traced.pattern.remaining_factors(self.unknowns), len(self))
+        return roots_along(self.setup.pattern.remaining_factors(self.unknowns), len(self))
 
 
 def _clip_rounding(v: Array, low: float, high: float) -> Array:
     """The values, where those that exceed a limit only by rounding errors are set to the limit."""
-    limited = np.clip(v, low, high)
-    return np.where(np.abs(v - limited) <= _ROUNDING * (1 + np.abs(v)), limited, v)
+    clipped = np.clip(v, low, high)
+    return np.where(np.abs(v - clipped) <= _ROUNDING * (1 + np.abs(v)), clipped, v)
 
 
 def roots_along(factors: list[list[Any]], count: int) -> Complex:
@@ -147,9 +146,9 @@ def roots_along(factors: list[list[Any]], count: int) -> Complex:
     columns = [np.zeros((count, 0), dtype=complex)]
     for factor in factors:
         rows = np.stack([np.broadcast_to(np.asarray(c, dtype=float), count) for c in factor], axis=-1)
-        finite = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0)
+        is_finite = np.isfinite(rows).all(axis=1) & (rows[:, 0] != 0)
         columns.append(np.full((count, len(factor) - 1), np.nan, dtype=complex))
-        columns[-1][finite] = roots(rows[finite])
+        columns[-1][is_finite] = roots(rows[is_finite])
     return np.concatenate(columns, axis=-1)
 
 

@@ -12,16 +12,16 @@ from tmsopt.records import Array
 
 _MAX_RESIDUAL = 1e-10  # largest relative residual of a solution; it excludes stationary points of the residual
 _STEP_SHARES = 0.5 ** np.arange(10)  # shares of a Gauss–Newton step; the first share that reduces the residual is used
-_MAX_STEPS = 40  # most Gauss–Newton steps
+_MAX_STEPS = 40  # largest number of Gauss–Newton steps
 _ZERO_ACCURACY = 1e-17  # accuracy of a zero near 0, relative to the interval
 _END_RATIO = 1e-6  # an end is a zero if its value is below this share of the value at the opposite end
-_EPS = 4 * np.finfo(float).eps
-_MAX_HALVINGS = 100  # most steps towards a zero
+_EPS = 4 * np.finfo(float).eps  # accuracy of a zero, relative to its size
+_MAX_HALVINGS = 100  # largest number of steps towards a zero
 
 
 @np.errstate(over="ignore")
 def project_rows(system: ca.Function, y: Array, held_variables: Sequence[int | None]) -> Array:
-    """Solutions near the rows of y by the damped Gauss–Newton method; nan where it finds none.
+    """Solutions near the rows of y by the damped Gauss–Newton method; nan where there is no solution.
 
     Args:
         system: y → any number of equations and their Jacobian.
@@ -48,11 +48,11 @@ def project_rows(system: ca.Function, y: Array, held_variables: Sequence[int | N
             if undecided.size:
                 trial = points[undecided] + share * step[undecided]
                 value = evaluate_rows(system, trial)[0]
-                lower = np.all(np.isfinite(trial), axis=1) & (np.abs(value).max(axis=1) < size[undecided])
-                y[rows[undecided[lower]]] = trial[lower]
-                undecided = undecided[~lower]
-        converged = undecided[size[undecided] <= 1e-13]
-        solutions[rows[converged]] = points[converged]
+                is_lower = np.all(np.isfinite(trial), axis=1) & (np.abs(value).max(axis=1) < size[undecided])
+                y[rows[undecided[is_lower]]] = trial[is_lower]
+                undecided = undecided[~is_lower]
+        solved_rows = undecided[size[undecided] <= 1e-13]
+        solutions[rows[solved_rows]] = points[solved_rows]
         rows = np.delete(rows, [*np.flatnonzero(has_stopped), *undecided])
     return solutions
 
@@ -62,27 +62,27 @@ def find_zeros(function: Callable[[Array], Array], ends: Array) -> Array:
     a, b = ends.astype(float), np.zeros(len(ends))
     fa, fb = function(a), function(b)
     zeros = np.where(np.abs(fa) < np.abs(fb), a, b)
-    smaller_end, larger_end = np.sort(np.abs([fa, fb]), axis=0)
-    zeros = np.where(smaller_end <= _END_RATIO * larger_end, zeros, np.nan)  # rounding may hide a zero at an end
-    active = np.sign(fa) * np.sign(fb) < 0
+    smaller_value, larger_value = np.sort(np.abs([fa, fb]), axis=0)
+    zeros = np.where(smaller_value <= _END_RATIO * larger_value, zeros, np.nan)  # rounding may hide a zero at an end
+    is_active = np.sign(fa) * np.sign(fb) < 0
     share = np.full(len(ends), 0.5)
     for _ in range(_MAX_HALVINGS):
-        if not np.any(active):
+        if not np.any(is_active):
             break
         x = a + share * (b - a)
         fx = function(x)
-        same_sign = np.sign(fx) == np.sign(fa)  # a is the newest point, c the point before it
-        c, fc = np.where(same_sign, a, b), np.where(same_sign, fa, fb)
-        b, fb = np.where(same_sign, b, a), np.where(same_sign, fb, fa)
+        has_same_sign = np.sign(fx) == np.sign(fa)  # a is the newest point, c the point before it
+        c, fc = np.where(has_same_sign, a, b), np.where(has_same_sign, fa, fb)
+        b, fb = np.where(has_same_sign, b, a), np.where(has_same_sign, fb, fa)
         a, fa = x, fx
-        zeros = np.where(active, np.where(np.abs(fa) < np.abs(fb), a, b), zeros)
+        zeros = np.where(is_active, np.where(np.abs(fa) < np.abs(fb), a, b), zeros)
         with np.errstate(all="ignore"):
-            limit = (_ZERO_ACCURACY * np.abs(ends) + _EPS * np.abs(zeros)) / (2 * np.abs(b - a))
+            min_share = (_ZERO_ACCURACY * np.abs(ends) + _EPS * np.abs(zeros)) / (2 * np.abs(b - a))
             xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
             inverse = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
             share = np.where((phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi), inverse, 0.5)
-        active &= (limit <= 0.5) & (fa != 0) & (fb != 0) & np.isfinite(share)
-        share = np.where(active, np.clip(share, limit, 1 - limit), 0.0)
+        is_active &= (min_share <= 0.5) & (fa != 0) & (fb != 0) & np.isfinite(share)
+        share = np.where(is_active, np.clip(share, min_share, 1 - min_share), 0.0)
     return zeros
 
 
@@ -94,8 +94,9 @@ def evaluate_rows(system: ca.Function, y: Array) -> tuple[Array, Array]:
 
 def map_rows(function: ca.Function, *arguments: Array) -> list[Array]:
     """Evaluate a function of dense columns at every row of its arguments."""
-    room = 1 << max(len(arguments[0]) - 1, 0).bit_length()  # few sizes, since making a map is costly
-    return MappedFunction(function, room)(*arguments)
+    # a power of 2, so that few maps are made, since making one takes long
+    count = 1 << max(len(arguments[0]) - 1, 0).bit_length()
+    return MappedFunction(function, count)(*arguments)
 
 
 class MappedFunction:
@@ -113,7 +114,7 @@ class MappedFunction:
             buffer.set_res(k, memory.data)
 
     def __call__(self, *arguments: Array) -> list[Array]:
-        """One array of results per output, a row per row of the arguments."""
+        """One array of results per output, with one row for each row of the arguments."""
         count = len(arguments[0])
         for memory, a in zip(self._inputs, arguments, strict=True):
             memory[:count] = a

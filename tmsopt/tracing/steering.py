@@ -10,7 +10,7 @@ from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.tracing.branch import BranchPoint, table_at
 from tmsopt.tracing.continuation import CLOSED, CurvePoint, End, Walk, compute_tangent, follow
 from tmsopt.tracing.description import describe_end, find_events, make_branch
-from tmsopt.tracing.equations import TracedProblem, prepare_tracing
+from tmsopt.tracing.equations import TracingSetup, prepare_tracing
 from tmsopt.tracing.events import SAME_PLACE, Event, check_events
 from tmsopt.tracing.seeds import find_seeds
 from tmsopt.tracing.trace import STARTS, STEP, check_options, locate_pattern
@@ -51,11 +51,11 @@ def continue_from(
     problem_with_pattern, checked_events = locate_pattern(pose(problem), pattern), check_events(events)
     designs = [] if through is None else [through]
     check_options(problem_with_pattern, step, through=designs)
-    traced = prepare_tracing(problem_with_pattern)
-    for _, points in find_seeds(traced, 0 if designs else STARTS, 0, designs, []):
+    setup = prepare_tracing(problem_with_pattern)
+    for _, points in find_seeds(setup, 0 if designs else STARTS, 0, designs, []):
         for y in points:
             try:
-                return Continuation(traced, CurvePoint(y, compute_tangent(traced.curve, y)), step, checked_events)
+                return Continuation(setup, CurvePoint(y, compute_tangent(setup.curve, y)), step, checked_events)
             except ValueError:  # not a regular point of a curve
                 continue
     place = "near the design" if designs else "in the box"
@@ -67,7 +67,7 @@ def continue_from(
 class Continuation(Iterator[BranchPoint]):
     """Iterator over the points of one curve, which include its events; `continue_from` makes it.
 
-    It ends where the curve leaves the box, closes or has no direction, and at an event that stops the curve.
+    The iterator ends where the curve leaves the box, closes or has no direction, and at an event that stops the curve.
 
     Attributes:
         end: why there are no more points, in words; empty as long as there are more points.
@@ -87,10 +87,10 @@ class Continuation(Iterator[BranchPoint]):
 
     end: str
 
-    def __init__(self, traced: TracedProblem, start: CurvePoint, step: float, events: Sequence[Event]) -> None:
-        self._traced, self._step, self._events = traced, step, events
-        self._sign, self._arclength, self._last, self.end = 1, 0.0, start, ""
-        self._points = self._follow(start, fresh=True)
+    def __init__(self, setup: TracingSetup, start: CurvePoint, step: float, events: Sequence[Event]) -> None:
+        self._setup, self._step, self._events = setup, step, events
+        self._sign, self._arclength, self._last_point, self.end = 1, 0.0, start, ""
+        self._points = self._follow(start, yields_start=True)
 
     def __next__(self) -> BranchPoint:
         return next(self._points)
@@ -98,26 +98,28 @@ class Continuation(Iterator[BranchPoint]):
     def reverse(self) -> None:
         """Turn around at the last point; the next point lies behind it."""
         self._sign, self.end = -self._sign, ""
-        self._points = self._follow(CurvePoint(self._last.y, -self._last.t), fresh=False)
+        self._points = self._follow(CurvePoint(self._last_point.y, -self._last_point.t), yields_start=False)
 
-    def _follow(self, start: CurvePoint, fresh: bool) -> Iterator[BranchPoint]:
-        """Yield the points after a start, also the start itself if `fresh`; then set `end`."""
+    def _follow(self, start: CurvePoint, yields_start: bool) -> Iterator[BranchPoint]:
+        """Yield the points after a start, also the start itself if `yields_start`; then set `end`."""
         previous_points = [start]
-        for point in follow(self._traced.curve, start, self._step):
+        for point in follow(self._setup.curve, start, self._step):
             if isinstance(point, End):
-                self.end = describe_end(self._traced, point) or CLOSED
+                self.end = describe_end(self._setup, point) or CLOSED
                 return
             y, t = (np.array([getattr(p, name) for p in (*previous_points, point)]) for name in "yt")
-            walk, row_events = find_events(self._traced, Walk(y, t, (End(""), End(""))), self._events)
-            branch, arclength = make_branch(self._traced, walk, row_events), self._arclength
-            first = int(np.flatnonzero(np.all(walk.y == previous_points[-1].y, axis=1))[-1])
-            for row in range(first + (not fresh), len(walk.y)):
-                events = [event for at, event in row_events if at == row]
+            walk, row_events = find_events(self._setup, Walk(y, t, (End(""), End(""))), self._events)
+            branch, arclength = make_branch(self._setup, walk, row_events), self._arclength
+            first_row = int(np.flatnonzero(np.all(walk.y == previous_points[-1].y, axis=1))[-1])
+            for row in range(first_row + (not yields_start), len(walk.y)):
+                events = [event for event_row, event in row_events if event_row == row]
                 # the user turned around at this event
                 is_repeated = len(previous_points) == 1 and np.abs(walk.y[row] - start.y).max() <= SAME_PLACE
-                if (events and not is_repeated) or row == len(walk.y) - 1 or (fresh and row == first):
-                    self._last = CurvePoint(walk.y[row], walk.t[row])
-                    self._arclength = arclength + self._sign * float(branch.arclength[row] - branch.arclength[first])
+                if (events and not is_repeated) or row == len(walk.y) - 1 or (yields_start and row == first_row):
+                    self._last_point = CurvePoint(walk.y[row], walk.t[row])
+                    self._arclength = arclength + self._sign * float(
+                        branch.arclength[row] - branch.arclength[first_row]
+                    )
                     yield BranchPoint(
                         table_at(branch.parameters, row),
                         table_at(branch.unknowns, row),
@@ -131,4 +133,4 @@ class Continuation(Iterator[BranchPoint]):
                     if stop := [event.name for event in events if event.stop]:
                         self.end = stop[0]
                         return
-            previous_points, fresh = [previous_points[-1], point], False
+            previous_points, yields_start = [previous_points[-1], point], False

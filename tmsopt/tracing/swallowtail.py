@@ -35,7 +35,7 @@ AffineCoefficients = tuple[Array, Array, Array]
 
 _MIN_DEGREE = 4  # lowest degree with two double roots
 
-_SCAN_POINTS = 2000  # double roots r at which edges are searched
+_SCAN_POINTS = 2000  # number of double roots r at which edges are searched
 _SAME_ROW = 1e-12  # distance, in widths of the box, up to which two rows count as one
 _OFFSETS = np.array([1e-7, 4e-5, 1e-4, 1e-3, 4e-3, 0.012])
 _ROWS_AROUND = np.concatenate([-_OFFSETS[::-1], _OFFSETS])
@@ -62,7 +62,7 @@ class Swallowtail(Printable):
     """The surface with its edges.
 
     Attributes:
-        axes: the three free parameters; rows of patches have one value of the first.
+        axes: the three free parameters; a row of a patch has one value of the first.
         cusps: traced EP3 curves, the cuspidal edges.
         crossing: the traced EP set: 2EP2 where the surface intersects itself, and CEP2 on the rest of the curve.
 
@@ -88,18 +88,20 @@ class Swallowtail(Printable):
 def swallowtail(
     problem: ProblemSource, rows: int = 48, across: int = 24, starts: int = STARTS, *, progress: Listener | None = None
 ) -> Swallowtail:
-    """The surface of real negative double roots in the box of three free parameters: one, and an affine pair.
+    """The surface of real negative double roots in the box of three free parameters.
+
+    The coefficients must be affine functions of the last two parameters.
 
     Args:
         problem: with Fr, chi_B and lambda_s free, or three parameters of another model whose coefficients are affine
             in the last two (in their tangents, for angles).
         rows, across: number of points along the first parameter, and along r between two edges.
-        starts: starts of the traces of its edges; see `trace`.
+        starts: number of starts for tracing the edges; see `trace`.
         progress: function called with a `tmsopt.Progress` now and then.
 
     Raises:
         InputError: for another number of free parameters, coefficients that are not affine in two of them, or a
-            model of degree 2 or 3, whose roots cannot meet two by two.
+            model of degree 2 or 3, which cannot have two double roots.
 
     Example:
         >>> surface = tmsopt.swallowtail("problems/ep_set.toml", rows=4, across=4, starts=8)
@@ -117,9 +119,10 @@ def swallowtail(
         raise input_error(message, "model")
     if len(plane.free) != 3:
         raise input_error(f"found {len(plane.free)} free parameters; accepted: 3 for a surface", "parameters")
-    first, *pair = plane.free
+    first_name, *pair_names = plane.free
     if not _is_affine(plane):
-        message = f"the coefficients are not affine in {' and '.join(pair)}; list two last in which they are"
+        message = f"the coefficients are not affine in {' and '.join(pair_names)}; "
+        message += "put two parameters last in which they are affine"
         raise input_error(message, "parameters")
     cusps, crossing = (trace(plane, name, starts=starts, progress=progress) for name in ("EP3", "2EP2"))
     grid = _choose_rows(plane, rows, (*cusps.events, *crossing.events))
@@ -141,7 +144,7 @@ def swallowtail(
                 _make_patch(plane, grid[rows_of_run], left_edge, right_edge, across)
                 for left_edge, right_edge in pairwise(table.T)
             ]
-    return Swallowtail(plane.problem, (first, pair[0], pair[1]), tuple(patches), cusps, crossing)
+    return Swallowtail(plane.problem, (first_name, pair_names[0], pair_names[1]), tuple(patches), cusps, crossing)
 
 
 def _choose_rows(problem: Posed, count: int, events: Iterable[EventPoint]) -> Array:
@@ -157,22 +160,22 @@ def _choose_rows(problem: Posed, count: int, events: Iterable[EventPoint]) -> Ar
 
 
 def _compute_polynomials(problem: Posed, x: Any) -> Array:
-    """Coefficients at variables x, tangents for angles, shape (designs, n + 1)."""
+    """Coefficients at variables x (for an angle, its tangent), shape (designs, n + 1)."""
     return compute_coefficients(problem, design_at(problem, np.asarray(x)))
 
 
-def _split_affine(problem: Posed, first: float) -> AffineCoefficients:
+def _split_affine(problem: Posed, first_value: float) -> AffineCoefficients:
     constant, at_first_unit, at_second_unit = _compute_polynomials(
-        problem, [(first, 0.0, 0.0), (first, 1.0, 0.0), (first, 0.0, 1.0)]
+        problem, [(first_value, 0.0, 0.0), (first_value, 1.0, 0.0), (first_value, 0.0, 1.0)]
     )
     return constant, at_first_unit - constant, at_second_unit - constant
 
 
 def _is_affine(problem: Posed) -> bool:
-    first = float(np.mean(next(iter(problem.free.values()))))
-    A, B, C = _split_affine(problem, first)
+    first_value = float(np.mean(next(iter(problem.free.values()))))
+    A, B, C = _split_affine(problem, first_value)
     predicted = np.array([A + 2 * B + 3 * C, A - B + C / 2])
-    actual = _compute_polynomials(problem, [(first, 2.0, 3.0), (first, -1.0, 0.5)])
+    actual = _compute_polynomials(problem, [(first_value, 2.0, 3.0), (first_value, -1.0, 0.5)])
     return bool(np.all(np.abs(actual - predicted) <= 1e-9 * np.abs(predicted).max(axis=1, keepdims=True)))
 
 
@@ -180,12 +183,12 @@ def _solve_double_root(affine: AffineCoefficients, r: Array) -> tuple[Array, Arr
     """x and y for which r is a double root: p(r) = p′(r) = 0 by Cramer's rule."""
     (A, B, C), (dA, dB, dC) = ([np.polyval(p, r) for p in affine], [np.polyval(np.polyder(p), r) for p in affine])
     with np.errstate(all="ignore"):
-        size = B * dC - C * dB
-        return (C * dA - A * dC) / size, (A * dB - B * dA) / size
+        determinant = B * dC - C * dB
+        return (C * dA - A * dC) / determinant, (A * dB - B * dA) / determinant
 
 
-def _find_cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
-    """For each interval of r inside the box, in ascending order, its two ends and the edges between them.
+def _find_cuts(problem: Posed, first_value: float, scan: Array) -> list[list[Cut]]:
+    """For each interval of r inside the box, in ascending order: its two ends, and the edges between the ends.
 
     Edges are zeros of three functions of r: of the distance to the box, of the polynomial of the other roots at r
     (EP3), and of the discriminant of this polynomial (2EP2).
@@ -193,7 +196,7 @@ def _find_cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
     Args:
         scan: values of r between which the edges are searched.
     """
-    affine, (low, high) = _split_affine(problem, first), (limit[1:, None] for limit in limits_of(problem))
+    affine, (low, high) = _split_affine(problem, first_value), (limit[1:, None] for limit in limits_of(problem))
 
     def tests(r: Array) -> list[Array]:
         x = np.stack(_solve_double_root(affine, r))
@@ -209,8 +212,8 @@ def _find_cuts(problem: Posed, first: float, scan: Array) -> list[list[Cut]]:
         cuts += [(float(r), kind) for r in scan[rows] + find_zeros(value, np.diff(scan)[rows])]
     ends = [r for r in (scan[0], scan[-1]) if values[0][r == scan][0] > 0]
     cuts = sorted([*cuts, *((float(r), "box") for r in ends)])
-    boxes = [k for k, (_, kind) in enumerate(cuts) if kind == "box"]
-    return [cuts[i : j + 1] for i, j in zip(boxes[::2], boxes[1::2], strict=True)]
+    box_cuts = [k for k, (_, kind) in enumerate(cuts) if kind == "box"]
+    return [cuts[i : j + 1] for i, j in zip(box_cuts[::2], box_cuts[1::2], strict=True)]
 
 
 def _divide(p: Array, r: Array) -> Array:
@@ -222,15 +225,19 @@ def _divide(p: Array, r: Array) -> Array:
 
 
 def _make_patch(problem: Posed, grid: Array, left_edge: Array, right_edge: Array, across: int) -> Patch:
-    share = (1 - np.cos(np.linspace(0, np.pi, across))) / 2  # dense at the edges, where the surface turns back
-    r = left_edge[:, None] + (right_edge - left_edge)[:, None] * share
+    positions = (1 - np.cos(np.linspace(0, np.pi, across))) / 2  # dense at the edges, where the surface turns back
+    r = left_edge[:, None] + (right_edge - left_edge)[:, None] * positions
     pairs = [
-        _solve_double_root(_split_affine(problem, first), row) for first, row in zip(grid.tolist(), r, strict=True)
+        _solve_double_root(_split_affine(problem, first_value), row)
+        for first_value, row in zip(grid.tolist(), r, strict=True)
     ]
     x = np.stack([np.broadcast_to(grid[:, None], r.shape), *np.array(pairs).transpose(1, 0, 2)], axis=-1)
     points = design_at(problem, x.reshape(-1, 3))
     middle = len(grid) // 2, across // 2
     p, root = _compute_polynomials(problem, [x[middle]])[0], r[middle]
-    quotient = np.polydiv(p, np.array([1.0, -2 * root, root * root]))[0]  # by (s − r)²: the other roots
-    heavily_damped = bool(is_stable(quotient) and real_roots(quotient)[0] == len(quotient) - 1)
+    quotient = np.polydiv(p, np.array([1.0, -2 * root, root * root]))[
+        0
+    ]  # the polynomial of the other roots, divided by (s − r)²
+    negative_count, _ = real_roots(quotient)
+    heavily_damped = bool(is_stable(quotient) and negative_count == len(quotient) - 1)
     return Patch({n: column.reshape(r.shape) for n, column in points.items()}, r, heavily_damped)

@@ -1,4 +1,4 @@
-"""Trace a root pattern through parameter space: every branch in the box, with its events."""
+"""Traces a root pattern through parameter space: every branch in the box, with its events."""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,11 +31,11 @@ from tmsopt.tracing.continuation import Walk
 from tmsopt.tracing.description import make_branches
 from tmsopt.tracing.equations import prepare_tracing
 from tmsopt.tracing.events import Event, check_events
-from tmsopt.tracing.seeds import find_missed, find_seeds, walk_new_curves
+from tmsopt.tracing.seeds import find_missed_seeds, find_seeds, walk_new_curves
 
 STARTS = 48
 STEP = 0.005
-MOST = 200_000
+MAX_POINTS = 200_000
 
 
 def trace(
@@ -45,12 +45,12 @@ def trace(
     step: float = STEP,
     starts: int = STARTS,
     seed: int = 0,
-    most: int = MOST,
+    most: int = MAX_POINTS,
     through: Sequence[Mapping[str, float]] = (),
     events: Sequence[Event] = (),
     progress: Listener | None = None,
 ) -> Trace:
-    """Every branch of a pattern in the box. The pattern needs one free parameter more than it has conditions.
+    """Trace every branch of a pattern in the box. The pattern needs one free parameter more than it has conditions.
 
     Args:
         pattern: name of the pattern; by default the pattern that the problem locates.
@@ -81,22 +81,22 @@ def trace(
     counts = ("starts", starts, 0, MOST_STARTS), ("seed", seed, 0, None), ("most", most, _MIN_POINTS, None)
     check_options(problem, step, *counts, through=through, progress=progress)
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
-    traced = prepare_tracing(problem)
+    setup = prepare_tracing(problem)
     walks: list[Walk] = []
     tried_starts = 0
 
-    def points() -> Iterator[list[Array]]:
+    def find_points() -> Iterator[list[Array]]:
         nonlocal tried_starts
-        for count, seeds in chain(find_seeds(traced, starts, seed, through, walks), find_missed(traced, walks)):
+        for count, seeds in chain(find_seeds(setup, starts, seed, through, walks), find_missed_seeds(setup, walks)):
             tried_starts = max(tried_starts, count)
             if steps:
                 steps(tried_starts, max(tried_starts, starts), f"{len(walks)} branch{'es' * (len(walks) != 1)}")
             yield seeds
 
-    walk_new_curves(traced.curve, points(), (step, most), walks)
+    walk_new_curves(setup.curve, find_points(), step, most, walks)
     with np.errstate(all="ignore"):  # values near infinity may not be finite
-        # a residual of nan is never small enough
-        branches = [b for w in walks for b in make_branches(traced, w, checked_events) if b.residual <= _MAX_RESIDUAL]
+        # a branch with the residual nan is left out
+        branches = [b for w in walks for b in make_branches(setup, w, checked_events) if b.residual <= _MAX_RESIDUAL]
     branches.sort(key=lambda b: -float(b.arclength[-1]))
     seconds = time.perf_counter() - started
     return Trace(
@@ -121,22 +121,22 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
         reason = "" if str(error).endswith("is no pattern") else f": {error}"
         message = f"unknown pattern '{name}'{reason}; {suggest(str(name), names)}"
         raise input_error(message, "objective", "locate") from error
-    question = problem.derive(locate=name, minimize=None, maximize=None)
-    count = degrees_of_freedom(question)
-    if count.count != 1:
-        free, needed_count = ", ".join(problem.free) or "none", count.conditions + 1
+    problem_with_pattern = problem.derive(locate=name, minimize=None, maximize=None)
+    freedom = degrees_of_freedom(problem_with_pattern)
+    if freedom.count != 1:
+        free, needed_count = ", ".join(problem.free) or "none", freedom.conditions + 1
         advice = (
-            f"free {needed_count - count.free} more"
-            if count.count < 1
-            else f"fix {count.count - 1} of them, or add as many == constraints"
+            f"free {needed_count - freedom.free} more"
+            if freedom.count < 1
+            else f"fix {freedom.count - 1} of them, or add as many == constraints"
         )
-        conditions = f"{count.conditions} condition{'s' * (count.conditions != 1)}"
+        conditions = f"{freedom.conditions} condition{'s' * (freedom.conditions != 1)}"
         message = (
             f"a curve of {name} needs {needed_count} free parameters ({conditions} and one to move along), "
-            f"found {count.free} ({free}); {advice}"
+            f"found {freedom.free} ({free}); {advice}"
         )
         raise input_error(message, "parameters")
-    return question
+    return problem_with_pattern
 
 
 def check_options(
@@ -152,11 +152,13 @@ def check_options(
     """
     faults = [fault for count in counts for fault in count_faults(*count)]
     faults += [*call_faults("progress", progress), *list_faults("through", through, _DESIGN_EXAMPLE)]
-    if not is_number(step) or not STEPS[0] <= step <= STEPS[1]:
-        faults.append(Fault(f"found {step!r}; accepted: a number from {STEPS[0]:g} to {STEPS[1]:g}", ("step",)))
+    if not is_number(step) or not STEP_RANGE[0] <= step <= STEP_RANGE[1]:
+        faults.append(
+            Fault(f"found {step!r}; accepted: a number from {STEP_RANGE[0]:g} to {STEP_RANGE[1]:g}", ("step",))
+        )
     for design in through if not faults else ():
-        if wrong := table_faults("through", design, _DESIGN_EXAMPLE):
-            faults += wrong
+        if design_faults := table_faults("through", design, _DESIGN_EXAMPLE):
+            faults += design_faults
         elif set(design) != set(problem.free):
             names = ", ".join(problem.free)
             faults.append(Fault(f"found {', '.join(design) or 'nothing'}; accepted: each of {names}", ("through",)))
@@ -169,9 +171,9 @@ def check_options(
         raise InputError(faults)
 
 
-STEPS = (1e-6, 0.1)
+STEP_RANGE = (1e-6, 0.1)
 """Smallest and largest `step`."""
 
 _DESIGN_EXAMPLE = "{'Fr': 1.2, 'mu': 0.1}"
-_MIN_POINTS = 4  # fewest points of a curve with tangents
-_MAX_RESIDUAL = 1e-3  # largest mismatch of the coefficients on a curve of the pattern
+_MIN_POINTS = 4  # smallest accepted `most`
+_MAX_RESIDUAL = 1e-3  # largest mismatch of a coefficient on a curve of the pattern
