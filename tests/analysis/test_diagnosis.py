@@ -202,7 +202,7 @@ def test_a_crossing_that_is_met_to_less_than_its_digits_moves_linearly():
     for answer in diagnosis.responses:
         (law,) = answer.laws
         assert (answer.relative, str(law.branches.exponent), law.branches.roots) == (False, "1", 2)
-        assert law.branches.size == pytest.approx(1, rel=1e-12)
+        assert law.branches.prefactor == pytest.approx(1, rel=1e-12)
 
 
 def test_equal_oscillators_that_are_met_to_their_sixth_digit_move_linearly():
@@ -212,7 +212,7 @@ def test_equal_oscillators_that_are_met_to_their_sixth_digit_move_linearly():
     assert diagnosis.im == pytest.approx(sqrt(2 - 0.0025), rel=1e-14)
     (law,) = response(diagnosis, "k2").laws
     assert (str(law.branches.exponent), law.branches.roots, response(diagnosis, "k2").unmoved) == ("1", 1, 1)
-    assert law.branches.size == pytest.approx(1 / sqrt(2 - 0.0025), rel=1e-9)
+    assert law.branches.prefactor == pytest.approx(1 / sqrt(2 - 0.0025), rel=1e-9)
 
 
 def test_a_singular_exceptional_point_moves_linearly():
@@ -222,7 +222,7 @@ def test_a_singular_exceptional_point_moves_linearly():
     assert (diagnosis.geometric, diagnosis.eigenfrequency) == (1, 0)
     for answer in diagnosis.responses:
         (law,) = answer.laws
-        assert (answer.relative, str(law.branches.exponent), law.branches.size) == (False, "1", pytest.approx(1))
+        assert (answer.relative, str(law.branches.exponent), law.branches.prefactor) == (False, "1", pytest.approx(1))
         assert (answer.unmoved, answer.unresolved) == (1, 0)
 
 

@@ -71,7 +71,7 @@ def test_a_sensor_responds_by_the_root_of_its_order(name, exponent, size):
     (diagnosis,) = tmsopt.diagnose(f"problems/{name}.toml")
     (law,) = next(r for r in diagnosis.responses if r.parameter == "eps").laws
     assert (str(law.branches.exponent), law.branches.roots) == (exponent, diagnosis.algebraic)
-    assert law.branches.size == pytest.approx(size, rel=1e-9)
+    assert law.branches.prefactor == pytest.approx(size, rel=1e-9)
 
 
 def test_the_curve_of_a_dimer_is_half_the_difference_of_losses():
@@ -283,10 +283,10 @@ def test_a_parameter_at_zero_is_changed_absolutely_and_shifts_hold():
     assert not by["d"].relative
     (law,) = by["d"].laws
     assert str(law.branches.exponent) == "1/2"
-    assert law.branches.size == pytest.approx(math.sqrt(0.6), rel=1e-9)
+    assert law.branches.prefactor == pytest.approx(math.sqrt(0.6), rel=1e-9)
     (common,) = by["w"].laws
     assert str(common.branches.exponent) == "1"
-    assert common.branches.size == pytest.approx(1, rel=1e-9)
+    assert common.branches.prefactor == pytest.approx(1, rel=1e-9)
     assert (common.below, common.above) == (1, 1)  # it is exact
     text = found.report(full=True)
     assert "not move it" not in text

@@ -161,7 +161,7 @@ def diagnose_roots(
 
 def _rank_response(response: Response) -> tuple[float, float]:
     fastest = response.laws[0].branches if response.laws else None
-    return (float(fastest.exponent), -fastest.size) if fastest else (math.inf, 0.0)
+    return (float(fastest.exponent), -fastest.prefactor) if fastest else (math.inf, 0.0)
 
 
 def _law_to_json(law: Law) -> dict[str, Any]:
@@ -169,6 +169,7 @@ def _law_to_json(law: Law) -> dict[str, Any]:
     return {
         "roots": b.roots,
         "exponent": str(b.exponent),
-        **plain(b, "numerator denominator constants size", digits=6),
+        **plain(b, "numerator denominator constants", digits=6),
+        **plain({"size": b.prefactor}, digits=6),
         "holds": plain(law, "least below above", digits=6) | {"deviation": DEVIATION},
     }

@@ -9,6 +9,8 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
+from tmsopt.deprecated import rename_attribute
+
 _SAME_COEFFICIENT = 1e-9  # relative difference of coefficients up to which a polynomial is a power of a linear one
 
 
@@ -31,8 +33,10 @@ class Branches:
         """Exponent of ε."""
         return Fraction(self.numerator, self.denominator)
 
+    size = rename_attribute("size", "prefactor")
+
     @property
-    def size(self) -> float:
+    def prefactor(self) -> float:
         """The largest |t| divided by |ε| to the exponent."""
         return float(max(abs(c) for c in self.constants) ** (1 / self.denominator))
 

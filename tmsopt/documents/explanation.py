@@ -223,7 +223,7 @@ def _describe_laws(response: Response, diagnosis: Diagnosis) -> str:
 def _format_law(law: Law) -> str:
     exponent = str(law.branches.exponent)
     power = "ε" if exponent == "1" else f"ε^({exponent})" if "/" in exponent else f"ε^{exponent}"
-    return f"{law.branches.size:.3g} {power}"
+    return f"{law.branches.prefactor:.3g} {power}"
 
 
 def _describe_range(law: Law) -> str:
