@@ -12,7 +12,7 @@ from unittest.mock import patch
 import casadi as ca
 import numpy as np
 
-from tmsopt.executor import here, processes
+from tmsopt.executor import in_process, processes
 from tmsopt.program import forget_solvers
 
 
@@ -29,7 +29,8 @@ def best(works: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, floa
 
 def over_processes(work: Callable[[Any], Any], items: Sequence[Any], workers: int) -> Iterator[Any]:
     """The answers in order, from processes that end when this one is interrupted; of one worker from this one."""
-    with here() if workers == 1 or not items else processes(workers) as executor:  # processes take a second to begin
+    # Processes take a second to begin.
+    with in_process() if workers == 1 or not items else processes(workers) as executor:
         answers, ready = executor.map(work, items), dict[int, Any]()
         for place in range(len(items)):
             while place not in ready:

@@ -313,7 +313,7 @@ def test_files_are_written_whole():
         "tmsopt.files.write_atomic",  # itself
         "tmsopt.documents.html._save_image",
         "tmsopt.plots.style.render",  # in memory
-        "tmsopt.killable.serve",  # a pipe
+        "tmsopt.killable.serve_calls",  # a pipe
         "tmsopt.studies.export._write_csv",
         "tmsopt.studies.export._write_netcdf",
         "tmsopt.studies.export._write_parquet",  # by `export`

@@ -264,19 +264,19 @@ def test_the_first_python_example_runs(monkeypatch):
 @pytest.mark.parametrize(
     ("line", "constants"),
     [
-        ("problem, study and bicycle files", "files.LARGEST problem.toml.MAX_DEPTH problem.toml.MAX_KEY_PARTS"),
-        ("errors that are listed", "errors.LISTED"),
+        ("problem, study and bicycle files", "files.MAX_FILE_BYTES problem.toml.MAX_DEPTH problem.toml.MAX_KEY_PARTS"),
+        ("errors that are listed", "errors.MAX_LISTED"),
         (
             "expressions",
-            "models.expression._LONGEST models.expression._DEEPEST models.stated.degree.LARGEST_EXPONENT models.stated.degree.LARGEST_DEGREE",
+            "models.expression._MAX_LENGTH models.expression._MAX_DEPTH models.stated.degree.LARGEST_EXPONENT models.stated.degree.LARGEST_DEGREE",
         ),
-        ("quantities of a model", "models.stated.texts.MOST_QUANTITIES"),
-        ("numbers of parameters", "models.exact.MOST_DIGITS problem.units.text.MAX_LENGTH"),
+        ("quantities of a model", "models.stated.texts.MAX_QUANTITIES"),
+        ("numbers of parameters", "models.exact.MAX_DIGITS problem.units.text.MAX_LENGTH"),
         (
             "CSV files of rows",
-            "studies.files.LARGEST studies.files.LONGEST_LINE studies.files.MOST_COLUMNS studies.sampling.MOST_ROWS studies.sampling.MOST_NUMBERS",
+            "studies.files.MAX_FILE_BYTES studies.files.LONGEST_LINE studies.files.MOST_COLUMNS studies.sampling.MOST_ROWS studies.sampling.MOST_NUMBERS",
         ),
-        ("a store from another person", "files.LARGEST_JSON studies.store.LARGEST"),
+        ("a store from another person", "files.MAX_JSON_CHARACTERS studies.store.LARGEST"),
         ("a chart", "charts.survey.MAX_DESIGNS charts.survey.MAX_TILES"),
     ],
 )

@@ -17,8 +17,8 @@ from helpers import works
 from helpers.works import Fake, Unloadable
 
 from tmsopt.errors import InputError
-from tmsopt.executor import Crash, EngineError, cluster, cores, here, processes
-from tmsopt.killable import Killable, ProcessEnded, start as start_process
+from tmsopt.executor import Crash, EngineError, cluster, cores, in_process, processes
+from tmsopt.killable import KillableProcess, ProcessEnded, start_process
 
 
 def local_cluster(workers, **options):
@@ -56,7 +56,7 @@ def values(results):
 
 def test_results_are_those_of_this_process(start, tmp_path):
     work = Fake(tmp_path)
-    with here() as one, start() as many:
+    with in_process() as one, start() as many:
         alone, shared = dict(one.map(work, range(300))), dict(many.map(work, range(300)))
         assert list(many.map(work, [])) == []
     assert values(shared) == values(alone)
@@ -190,7 +190,7 @@ def running(pid):
 
 
 def test_a_killable_process_answers_raises_and_ends():
-    process = Killable()
+    process = KillableProcess()
     try:
         assert process.call(abs, -3).result(timeout=60) == 3
         assert isinstance(process.call(abs, "x").exception(timeout=60), TypeError)

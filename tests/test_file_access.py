@@ -98,7 +98,7 @@ def test_a_new_file_takes_no_other_ones_place(there, tmp_path):
     path = tmp_path / "a.toml"
     path.write_text("mine") if there == "file" else path.symlink_to(tmp_path / "nothing")
     with pytest.raises(FileExistsError) as refused:
-        write_text(path, "other", new=True)
+        write_text(path, "other", must_be_new=True)
     assert refused.value.filename == str(path)
     assert [p.name for p in tmp_path.iterdir()] == ["a.toml"]
 
@@ -118,7 +118,7 @@ def test_what_a_folder_is_made_under_is_no_link(tmp_path):
     kept = tmp_path / "kept"
     kept.mkdir()
     (tmp_path / ".a.chart.unfinished").symlink_to(kept)
-    with write_atomic(tmp_path / "a.chart", locked=True) as place:
+    with write_atomic(tmp_path / "a.chart", is_locked=True) as place:
         place.mkdir(parents=True)
         (place / "file").touch()
     assert list(kept.iterdir()) == []

@@ -1,4 +1,4 @@
-"""``python -m tmsopt``: the command by another way."""
+"""Runs the command `tmsopt` as ``python -m tmsopt``."""
 
 from tmsopt.cli import main
 

@@ -10,7 +10,7 @@ R = TypeVar("R")
 
 
 def ignore_option(name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """A decorator that accepts one more keyword, ignores it, and warns that it is no longer needed."""
+    """Decorate a function: it accepts one more keyword, ignores it, and warns that it is no longer needed."""
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         @wraps(function)
@@ -25,7 +25,7 @@ def ignore_option(name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 
 def rename_attribute(old: str, new: str) -> Any:
-    """A property under the name of an earlier version, which warns and gives the attribute under its new name."""
+    """A property with the name of an earlier version. It warns, and returns the attribute with the new name."""
 
     def read(owner: Any) -> Any:
         message = f"{type(owner).__name__}.{old} is now {type(owner).__name__}.{new}"
@@ -36,13 +36,15 @@ def rename_attribute(old: str, new: str) -> Any:
 
 
 class ReportModule:
-    """`tmsopt.report` of 1.1: whatever is called in it gives the report of the last result among its arguments."""
+    """`tmsopt.report` of 1.1. Each of its functions returns the report of the last result among its arguments."""
 
     def __getattr__(self, name: str) -> Callable[..., str]:
         if name.startswith("_"):
             raise AttributeError(name)
         warnings.warn(f"tmsopt.report.{name} is gone: call .report() of the result", DeprecationWarning, stacklevel=2)
-        return lambda *given, full=False, **_: str([x for x in given if hasattr(x, "report")][-1].report(full=full))
+        return lambda *arguments, full=False, **_: str(
+            [x for x in arguments if hasattr(x, "report")][-1].report(full=full)
+        )
 
 
 def no_longer_needed(option: str) -> str:
@@ -58,10 +60,10 @@ MOVED_TO_POSED = (
 
 
 def read_from_posed(problem: Any, name: str) -> Any:
-    """An attribute that has moved from a problem to its `posed`, with a warning.
+    """An attribute that has moved from a problem to `Problem.posed`, with a warning.
 
     Raises:
-        AttributeError: if `name` is not one of these.
+        AttributeError: if no attribute of this name has moved.
     """
     if name not in MOVED_TO_POSED.split():
         raise AttributeError(f"'{type(problem).__name__}' object has no attribute '{name}'", name=name, obj=problem)

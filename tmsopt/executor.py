@@ -1,7 +1,7 @@
 """Executors call a function for many items: in this process, in processes of this machine or on a Dask cluster.
 
-An item that ends its worker yields a `Crash`, and no other item is lost. The workers end at once when the iterator is
-closed, on Ctrl-C, and when this process ends, even by kill -9.
+The result of an item that ends its worker is a `Crash`, and no other item is lost. The workers end at once when the
+iterator is closed, on Ctrl-C, and when this process ends, even by kill -9.
 """
 
 import asyncio
@@ -21,7 +21,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, Self
 
 from tmsopt.errors import input_error
-from tmsopt.killable import Killable, ProcessEnded
+from tmsopt.killable import KillableProcess, ProcessEnded
 
 PATIENCE = 10.0
 """Longest time in s to wait for an answer of a Dask scheduler."""
@@ -30,10 +30,10 @@ Note = Callable[[str], None]
 """A callback for one line about workers that join, leave or crash."""
 
 _BATCH_SECONDS = 0.2  # a batch of items should take this time in s
-_RECENT_BATCHES = 64  # the mean time per item of so many batches predicts that of the next one
-_BATCHES_PER_WORKER = 2  # batches in flight, which are sent but not answered: a worker computes one, the next is sent
-_CHECK_SECONDS = 1.0  # time between checks of the workers; some systems ignore Ctrl-C during a wait
-_MAX_CRASHES = 2  # an item is given up after so many crashes while no other item was in flight
+_RECENT_BATCHES = 64  # the mean time for an item in so many batches predicts the time of the next batch
+_BATCHES_PER_WORKER = 2  # batches for a worker that are sent but not answered: it computes one, the other one waits
+_CHECK_SECONDS = 1.0  # time between checks of the workers; a longer wait would ignore Ctrl-C on some systems
+_MAX_CRASHES = 2  # an item is given up after so many crashes while no other item was computed
 _WORKER_COMMAND = "'dask worker ADDRESS --nthreads 1'"
 _START_TRIES = 3  # attempts to start a process that ends at once
 
@@ -77,8 +77,8 @@ class Executor:
     def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> Generator[tuple[int, Any]]:
         """Yield the index of each item with its result or `Crash`, in the order in which they finish.
 
-        Batches of items are sent to the workers. If a worker ends, each batch that is not answered is sent again alone;
-        if a worker ends again, the items of this batch are sent one by one.
+        Batches of items are sent to the workers. If a worker ends, the batches that are not answered are sent again,
+        one after another. If a worker ends again, the items of this batch are sent one after another.
 
         Raises:
             Exception: any exception that the function raises.
@@ -89,7 +89,7 @@ class Executor:
             return
         try:
             yield from self._results(self._pool, function, list(items))
-        except BaseException:  # the iterator was interrupted or closed, or failed: no more results are read
+        except BaseException:  # the iterator was interrupted or closed, or it failed: the caller reads no more results
             self._pool.end()
             raise
 
@@ -98,22 +98,23 @@ class Executor:
     ) -> Generator[tuple[int, Any]]:
         import cloudpickle
 
-        blob, inbox = cloudpickle.dumps(function), SimpleQueue[Any]()
-        in_flight, suspects, crashes = dict[Any, Sequence[int]](), deque[Sequence[int]](), Counter[int]()
-        recent_times, next_item, is_alone = deque[float](maxlen=_RECENT_BATCHES), 0, False
+        pickled_function, inbox = cloudpickle.dumps(function), SimpleQueue[Any]()
+        unanswered, crashes = dict[Any, Sequence[int]](), Counter[int]()
+        suspects = deque[Sequence[int]]()  # batches that were not answered when a worker ended; each is sent alone
+        recent_times, next_item, is_sent_alone = deque[float](maxlen=_RECENT_BATCHES), 0, False
 
         def send(batch: Sequence[int]) -> None:
-            future = pool.submit(blob, cloudpickle.dumps([items[place] for place in batch]))
-            in_flight[future] = batch
+            future = pool.submit(pickled_function, cloudpickle.dumps([items[index] for index in batch]))
+            unanswered[future] = batch
             future.add_done_callback(inbox.put)
 
-        while in_flight or suspects or next_item < len(items):
-            if suspects and not in_flight:
-                is_alone = True
+        while unanswered or suspects or next_item < len(items):
+            if suspects and not unanswered:
+                is_sent_alone = True
                 send(suspects.popleft())
-            while not (suspects or is_alone) and next_item < len(items):
+            while not (suspects or is_sent_alone) and next_item < len(items):
                 max_batches = _BATCHES_PER_WORKER * max(1, pool.workers)
-                if len(in_flight) >= max_batches:
+                if len(unanswered) >= max_batches:
                     break
                 size = _batch_size(recent_times, (len(items) - next_item) // max_batches)
                 send(range(next_item, next_item + size))
@@ -123,24 +124,24 @@ class Executor:
             except Empty:
                 pool.check_workers()
                 continue
-            batch, was_alone, is_alone = in_flight.pop(future), is_alone, False
+            batch, was_sent_alone, is_sent_alone = unanswered.pop(future), is_sent_alone, False
             try:
                 results, seconds, error = pickle.loads(pool.result(future))
             except _WorkerEnded as worker_end:
                 cause, is_given_up = str(worker_end), False
-                if not was_alone:
+                if not was_sent_alone:
                     suspects.append(batch)
                 elif len(batch) == 1:
                     crashes.update(batch)
                     is_given_up = crashes[batch[0]] == _MAX_CRASHES
-                if was_alone and not is_given_up:
-                    suspects.extendleft((place,) for place in reversed(batch))
+                if was_sent_alone and not is_given_up:
+                    suspects.extendleft((index,) for index in reversed(batch))
                 action = "given up" if is_given_up else "tried again, alone"
                 self._note(f"worker died{f' ({cause})' if cause else ''}; its item is {action}")
                 if is_given_up:
                     yield batch[0], Crash(cause)
                 continue
-            yield from zip(batch, results, strict=False)  # fewer results if one item raised an exception
+            yield from zip(batch, results, strict=False)  # there are fewer results if an item raised an exception
             if error is not None:
                 raise error
             recent_times.append(seconds / len(batch))
@@ -153,8 +154,8 @@ def cores() -> int:
     return int(loky.cpu_count())
 
 
-def here() -> Executor:
-    """An executor that calls the function in this process; a crash ends the process."""
+def in_process() -> Executor:
+    """An executor that calls the function in this process. A crash ends the process."""
     return Executor("in process")
 
 
@@ -171,11 +172,11 @@ def processes(workers: int, note: Note = ignore_note) -> Executor:
 
 
 def cluster(address: str, note: Note = ignore_note) -> Executor:
-    """An executor with the workers of a Dask scheduler. Workers may join and leave; if there is none, items wait.
+    """An executor with the workers of a Dask scheduler. Workers may join and leave; if there is no worker, items wait.
 
     Raises:
-        InputError: if `distributed` is not installed, no scheduler answers, a worker has several threads, or tmsopt is
-            not installed there.
+        InputError: if `distributed` is not installed, no scheduler answers, or a worker has several threads or does not
+            have tmsopt.
     """
     return Executor(address, _DaskPool(address, note), note)
 
@@ -185,31 +186,31 @@ class _WorkerEnded(Exception):
 
 
 def _batch_size(recent_times: Sequence[float], max_items: int) -> int:
-    """Number of items for `_BATCH_SECONDS` at the recent rate; small near the end, so that all workers end together."""
+    """Number of items that take `_BATCH_SECONDS` at the recent rate, or fewer, so that all workers end together."""
     size = math.ceil(_BATCH_SECONDS * len(recent_times) / max(sum(recent_times), 1e-9))
     return max(1, min(size, 2 * len(recent_times), max_items))
 
 
-# In a worker
+# Functions that run in a worker
 
 
 @lru_cache(maxsize=4)
-def _load(blob: bytes) -> Callable[[Any], Any]:
+def _load_function(pickled_function: bytes) -> Callable[[Any], Any]:
     """Unpickle a function, once for all its calls, so that it keeps its caches."""
     try:
-        function: Callable[[Any], Any] = pickle.loads(blob)
+        function: Callable[[Any], Any] = pickle.loads(pickled_function)
     except Exception as error:
         raise EngineError(f"workers cannot load the work: {error!r}") from error
     return function
 
 
-def _call(blob: bytes, items: bytes) -> bytes:
+def _call(pickled_function: bytes, items: bytes) -> bytes:
     """Pickled results of items, their time in s, and the exception that ended the batch, or None."""
     import cloudpickle
 
     results, error, start_time = list[Any](), None, time.perf_counter()
     try:
-        function = _load(blob)
+        function = _load_function(pickled_function)
         results.extend(map(function, pickle.loads(items)))
     except Exception as exception:
         error = exception
@@ -221,7 +222,7 @@ def _call(blob: bytes, items: bytes) -> bytes:
 
 
 class _ProcessPool:
-    """Processes of this machine; for each, a thread of this process sends calls. A process that ends is replaced.
+    """Processes of this machine. A thread of this process sends calls to each of them. A process that ends is replaced.
 
     `submit` gives the future of a call in a worker. `result` gives its result, or raises its exception or
     `_WorkerEnded`. `check_workers` is called about once a second, and `end` ends all calls and workers. `workers` is
@@ -231,7 +232,7 @@ class _ProcessPool:
     def __init__(self, workers: int) -> None:
         self.workers, self._lock = workers, threading.Lock()
         self._threads: ThreadPoolExecutor | None = None
-        self._running, self._idle = list[Killable](), list[Killable]()
+        self._running, self._idle = list[KillableProcess](), list[KillableProcess]()
 
     def submit(self, *call: Any) -> Any:
         self._threads = self._threads or ThreadPoolExecutor(self.workers)
@@ -263,14 +264,14 @@ class _ProcessPool:
         self._idle.append(process)
         return answer
 
-    def _start(self) -> Killable:
+    def _start(self) -> KillableProcess:
         """Start a process, and wait for its first answer."""
         cause = ""
         for _ in range(_START_TRIES):
             with self._lock:
                 if self._threads is None:  # the pool has ended
                     raise _WorkerEnded(cause)
-                process = Killable()
+                process = KillableProcess()
                 self._running.append(process)
             try:
                 process.answer(os.getpid)
@@ -284,7 +285,7 @@ class _ProcessPool:
 
 
 class _DaskPool:
-    """A client of a Dask scheduler; the scheduler repeats the calls of a worker that ended."""
+    """A client of a Dask scheduler, with the methods of `_ProcessPool`. It repeats calls of ended workers."""
 
     def __init__(self, address: str, note: Note) -> None:
         self._address, self._note = address, note
@@ -317,12 +318,12 @@ class _DaskPool:
             threads = self._client.nthreads()
         except OSError as error:
             raise self._lost_error() from error
-        bad_workers = [f"{place} has {count}" for place, count in threads.items() if count != 1]
+        bad_workers = [f"{worker} has {count}" for worker, count in threads.items() if count != 1]
         if bad_workers:
-            reason = f"workers need one thread each, two in one IPOPT crash the process; {', '.join(bad_workers)}"
+            reason = f"a worker needs exactly one thread, because two threads crash IPOPT; {', '.join(bad_workers)}"
             raise input_error(f"{reason}: start every worker with {_WORKER_COMMAND}", "scheduler")
-        for place in threads.keys() - self._checked:
-            _check_tmsopt(self._client, place)
+        for worker in threads.keys() - self._checked:
+            _check_tmsopt(self._client, worker)
         self._checked = frozenset(threads)
         if not threads and self.workers:
             self._note(f"no workers at {self._address}; rows wait until one joins")
@@ -353,8 +354,8 @@ def _connect(address: str) -> Any:
     try:
         with ThreadPoolExecutor(1) as thread:  # notebooks already run an event loop in this thread
             kind = thread.submit(asyncio.run, _server_kind(distributed, address)).result()
-        reason = "" if kind == "Scheduler" else f"a Dask {kind.lower()} does"
-    except Exception as error:  # any program may listen there
+        reason = "" if kind == "Scheduler" else f"a Dask {kind.lower()} answers there"
+    except Exception as error:  # any program may listen at this address
         reason = str(error) or type(error).__name__
     if reason:
         advice = "start one with 'dask scheduler', which prints its address, tcp://HOST:8786, and workers with"
@@ -364,23 +365,26 @@ def _connect(address: str) -> Any:
 
 
 async def _server_kind(distributed: Any, address: str) -> str:
+    """The kind of Dask server at an address: ``Scheduler``, ``Worker`` or ``Nanny``."""
     arguments = distributed.Security().get_connection_args("client")
     with suppress(TimeoutError):
         async with asyncio.timeout(PATIENCE), distributed.rpc(address, connection_args=arguments) as server:
             return str((await server.identity())["type"])
-    raise OSError(f"nothing within {PATIENCE:.0f} s")
+    raise OSError(f"no answer within {PATIENCE:.0f} s")
 
 
-def _check_tmsopt(client: Any, place: str) -> None:
-    def has_tmsopt() -> bool:  # pickled by value, so it runs without tmsopt
+def _check_tmsopt(client: Any, worker: str) -> None:
+    """Check that tmsopt is installed where a worker runs."""
+
+    def has_tmsopt() -> bool:  # it is pickled by value, so it runs without tmsopt
         from importlib.util import find_spec
 
         return find_spec("tmsopt") is not None
 
-    answer = client.run(has_tmsopt, workers=[place], on_error="return").get(place, OSError(place))
+    answer = client.run(has_tmsopt, workers=[worker], on_error="return").get(worker, OSError(worker))
     if isinstance(answer, Exception) and not isinstance(answer, OSError):  # OSError: the worker has left
-        message = f"worker {place} does not answer: {answer!r}; it needs the same Python and packages"
+        message = f"worker {worker} does not answer: {answer!r}; it needs the same Python and packages"
         raise input_error(message, "scheduler")
     if answer is False:
-        message = f"worker {place} has no tmsopt: install the same version there and start it again"
+        message = f"worker {worker} has no tmsopt: install the same version there and start it again"
         raise input_error(message, "scheduler")

@@ -1,4 +1,4 @@
-"""Processes that can be killed: workers of executors, and the solver SCIP, which may crash or must end at a time limit.
+"""Processes that can be killed: workers of executors, and the solver SCIP, which may crash and has a time limit.
 
 They do not use `multiprocessing`, because Dask workers may not have such child processes.
 """
@@ -22,16 +22,16 @@ class ProcessEnded(RuntimeError):
     """The process ended before it answered."""
 
 
-class Killable:
+class KillableProcess:
     """A process that runs one call at a time. It ignores Ctrl-C, and ends when this program ends, even by a crash.
 
     Args:
-        prepare: the process calls it first, and ignores its exceptions.
+        prepare: function that the process calls first; exceptions in it are ignored.
     """
 
     def __init__(self, prepare: Callable[[], object] = bool) -> None:
-        self._process = start()
-        with suppress(OSError):  # the process has ended; the first call will raise the error
+        self._process = start_process()
+        with suppress(OSError):  # the process has ended; the first call then raises the error
             self._send(prepare)
 
     def _send(self, message: object) -> None:
@@ -76,26 +76,26 @@ class Killable:
         return f"signal {-code}" if code < 0 else f"exit code {code}"
 
 
-def start() -> Any:
-    """Start a process that runs `serve`, with the import path of this one; it does not run the user's script again."""
-    code = "import sys; sys.path[:] = sys.argv[1:]; from tmsopt.killable import serve; serve()"
+def start_process() -> Any:
+    """Start a process that runs `serve_calls` with the import path of this process, without the user's script."""
+    code = "import sys; sys.path[:] = sys.argv[1:]; from tmsopt.killable import serve_calls; serve_calls()"
     return subprocess.Popen(
         [sys.executable, "-c", code, *sys.path],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         env=os.environ | ONE_THREAD,
-        start_new_session=True,  # Ctrl-C does not reach it; some schedulers share time between sessions
+        start_new_session=True,  # Ctrl-C does not reach the process; some schedulers share time between sessions
     )
 
 
-def serve() -> None:
+def serve_calls() -> None:
     """Answer calls until the parent process ends; then end, even during a call."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     calls, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    silence = os.open(os.devnull, os.O_RDWR)
+    null_device = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1):  # printed text must not reach the pipe of answers
-        os.dup2(silence, stream)
+        os.dup2(null_device, stream)
     queue = SimpleQueue[Any]()
     threading.Thread(target=_listen, args=(calls, queue), daemon=True).start()
     with suppress(Exception):
@@ -113,6 +113,7 @@ def serve() -> None:
 
 
 def _listen(calls: IO[bytes], queue: SimpleQueue[Any]) -> None:
+    """Put the calls from the parent into a queue; end this process when the parent ends."""
     with suppress(Exception):  # the parent has ended, perhaps while it wrote, or a call cannot be loaded here
         while True:
             queue.put(pickle.load(calls))

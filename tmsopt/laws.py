@@ -6,7 +6,7 @@ The module imports nothing from the package: tests use it as an independent refe
 Symbols, all dimensionless (lengths over the wheelbase w, time over sqrt(w/g)): `Fr` Froude number
 v/sqrt(g w), `mu` mass ratio m_H/m_B, `chi_B`, `chi_H` horizontal and `zeta_B`, `zeta_H` vertical positions
 of the two masses (z points down, so zeta < 0), `lambda_s` steer axis tilt in rad, `omega0` the multiple root
-(negative). In the notes r = sqrt(zeta_B/zeta_H) and h = sqrt(zeta_B zeta_H).
+(negative). The docstrings also use r = sqrt(zeta_B/zeta_H) and h = sqrt(zeta_B zeta_H).
 
 Every function takes floats or arrays, broadcasts them, and returns float64 of the broadcast shape, with a
 leading axis where the docstring says so. No value of an argument causes an error or a warning: a pole gives inf or
@@ -187,9 +187,9 @@ def lscf(Fr: Real, mu: Real, chi_B: Real, chi_H: Real, zeta_B: Real, zeta_H: Rea
     For lambda_s > 0 all five are necessary; for chi_H >= 1 they are also sufficient. For chi_H < 1 they are NOT
     sufficient, contrary to the paper: the condition a1 > 0, that is zeta_B chi_H < zeta_H chi_B, is missing. A
     counterexample is chi_H = 0.9, chi_B = 1.2, zeta_B = -0.5, zeta_H = -0.4, mu = 5, tan(lambda_s) = 0.5 with
-    Fr_c = 1: it is unstable at every Fr > 1. For lambda_s < 0 the five never hold together; there a bicycle is stable
-    exactly if the first four are reversed, zeta_B chi_H > zeta_H chi_B and Fr > Fr_c. `lscf_complete` is valid
-    everywhere.
+    Fr_c = 1: it is unstable at every Fr > 1. For lambda_s < 0 the five never hold together. There a bicycle is stable
+    exactly if the first four inequalities hold in reverse, zeta_B chi_H > zeta_H chi_B, and Fr > Fr_c.
+    `lscf_complete` is valid everywhere.
 
     Example:
         >>> benchmark = 0.1, 1.2, 1.02, -0.4, -0.2, tmsopt.laws.bench["lambda_s"]
@@ -513,16 +513,16 @@ def frep4(zeta_B: Real, zeta_H: Real) -> tuple[Real, Real]:
     """
     w = w01(zeta_B, zeta_H)
     a, half_b, c = w**2 * zeta_B - 1, w**3 * zeta_B, -(w**2 * zeta_B + 1) * tls(zeta_B, zeta_H)
-    far = -(half_b + _sqrt(half_b**2 - a * c))  # half_b > 0 and a c <= 0, so this sum does not cancel
-    return far / a, c / far
+    half_sum = -(half_b + _sqrt(half_b**2 - a * c))  # half_b > 0 and a c <= 0, so this sum loses no digits
+    return half_sum / a, c / half_sum
 
 
 @_law
 def epset(zeta_B: Real, zeta_H: Real, lambda_s: Real) -> Real:
     """Froude number at which a design with chi_H = 1, chi_B = `chib1` has two double roots. Equation `epset`.
 
-    It is nan unless tan(lambda_s) (r + 1)/(r - 1) > r/(4 h); equality is its pole. The double roots are real (2EP2)
-    if abs(tan(lambda_s)) is smaller than abs(`tls`), and complex (CEP2) if it is larger.
+    It is nan unless tan(lambda_s) (r + 1)/(r - 1) > r/(4 h); if both sides are equal, it is infinite. The double roots
+    are real (2EP2) if abs(tan(lambda_s)) is smaller than abs(`tls`), and complex (CEP2) if it is larger.
 
     Example:
         >>> tilt = tmsopt.laws.ep4_chi_H_1(-0.4, -0.2).lambda_s

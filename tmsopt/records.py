@@ -20,6 +20,7 @@ V = TypeVar("V")
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Truth = NDArray[np.bool_]
+"""Arrays of real numbers, of complex numbers, and of True and False."""
 
 Numbers = Mapping[str, float]
 """Name → number, such as the parameters of a design."""
@@ -29,10 +30,10 @@ AnyNumbers = Mapping[str, Any]
 
 
 class Printable(Protocol):
-    """A result that can print and draw itself. It uses `tmsopt.documents`, imported at first use."""
+    """A result that can print and draw itself. It imports `tmsopt.documents` at first use."""
 
     def report(self, full: bool = False) -> str:
-        """The text that the command line prints; with all sections if `full`."""
+        """The text that the command line prints; if `full`, it has all sections."""
         return str(call_documents("report", self, full))
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
@@ -156,7 +157,7 @@ def plain(record: Any, names: str = "", digits: int | None = None) -> dict[str, 
     nan and infinity become None, complex numbers become tables of re and im; `to_json` converts inner records.
 
     Args:
-        names: names of attributes, separated by blanks, in this order; by default every field.
+        names: names of the attributes to convert, separated by blanks; by default all fields.
         digits: number of significant digits; by default all.
     """
     if isinstance(record, Mapping):

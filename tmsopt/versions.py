@@ -8,7 +8,7 @@ from pathlib import Path
 SCHEMA = 1
 """Version of the JSON schema of every command."""
 
-REQUIRED = (
+REQUIRED_PACKAGES = (
     "casadi",
     "numpy",
     "scipy",
@@ -24,23 +24,25 @@ REQUIRED = (
     "loky",
     "filelock",
 )
-OPTIONAL = ("pyscipopt", "distributed", "pandas", "pyarrow", "xarray", "netCDF4")
-"""Distributions that tmsopt requires, and those of its extras certify, cluster and data."""
+"""Distributions that tmsopt requires."""
+
+OPTIONAL_PACKAGES = ("pyscipopt", "distributed", "pandas", "pyarrow", "xarray", "netCDF4")
+"""Distributions of the extras certify, cluster and data."""
 
 
 def environment() -> dict[str, object]:
-    """Python, system and library versions, on which results may depend, as plain data; None if not installed."""
+    """Versions of Python, the system and the libraries as plain data; None for a library that is not installed."""
     return {
         "python": platform.python_version(),
         "implementation": platform.python_implementation(),
         "system": platform.platform(),
         "machine": platform.machine(),
-        "packages": {**installed_versions((*REQUIRED, *OPTIONAL)), "ipopt": ipopt_version()},
+        "packages": {**installed_versions((*REQUIRED_PACKAGES, *OPTIONAL_PACKAGES)), "ipopt": ipopt_version()},
     }
 
 
 def installed_versions(names: Iterable[str]) -> dict[str, str | None]:
-    """The version of each distribution; None if not installed, as for a checkout that is only on the path."""
+    """Name → version of each distribution; None if it is not installed, like a checkout that is only on the path."""
     return {name: _version(name) for name in names}
 
 

@@ -9,7 +9,9 @@ import pytest
 from tmsopt.algebra import BALLS, Bounded, as_bounded
 
 kinds = import_module("tmsopt.algebra.kinds")
-greater, lesser, quotient = (getattr(kinds, name) for name in ["greater", "lesser", "quotient"])
+ball_maximum, ball_minimum, quotient_or_nan = (
+    getattr(kinds, name) for name in ["ball_maximum", "ball_minimum", "quotient_or_nan"]
+)
 
 FORMULAS = {
     "mixed": lambda a, b: (a * b + a) * (b / a) - 1 / b,
@@ -25,8 +27,8 @@ FORMULAS = {
     "acos": lambda a, b: (b / 4).acos(),
     "fraction": lambda a, b: flint.fmpq(1, 3) * a - b * flint.fmpq(2, 7),
     "irrational": lambda a, b: BALLS.operations["pow"](abs(a), flint.fmpq(2, 3)),
-    "greater": lambda a, b: greater(a * b, quotient(a, b)),
-    "lesser": lesser,
+    "greater": lambda a, b: ball_maximum(a * b, quotient_or_nan(a, b)),
+    "lesser": ball_minimum,
 }
 
 
@@ -77,7 +79,12 @@ def test_what_does_not_exist_is_never_known():
         )
         for number in lost:
             assert not number.is_known_within(1.0).any()
-            for choice in (greater(number, 1.0), greater(1.0, number), lesser(number, 1.0), lesser(1.0, number)):
+            for choice in (
+                ball_maximum(number, 1.0),
+                ball_maximum(1.0, number),
+                ball_minimum(number, 1.0),
+                ball_minimum(1.0, number),
+            ):
                 assert not choice.is_known_within(1.0).any()
 
 

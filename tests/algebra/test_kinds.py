@@ -39,8 +39,8 @@ ALIKE = {
     "pow": lambda a, b: a**b,
     "min": min,
     "max": max,
-    "quotient": lambda a, b: a / b,
-    "ratio": lambda a, b: a / b,
+    "quotient_or_nan": lambda a, b: a / b,
+    "quotient_or_zero": lambda a, b: a / b,
 }
 TRUTHS = {"less": lambda a, b: a < b, "at_most": lambda a, b: a <= b, "equal": lambda a, b: a == b}
 ALONE = {
@@ -57,8 +57,8 @@ ALONE = {
 """An operation on x, or on x/8, and on y."""
 
 BOTH = {
-    "both": lambda p, q: p and q,
-    "either": lambda p, q: p or q,
+    "and": lambda p, q: p and q,
+    "or": lambda p, q: p or q,
 }
 
 
@@ -113,14 +113,16 @@ def test_no_operation_is_left_out():
 
 def test_what_does_not_exist_is_nan_of_every_kind():
     x, y = symbol("x"), symbol("y")
-    own = formula([make_node("quotient", x, y), make_node("ratio", x, y), make_node("sqrt", -x)], ("x", "y"))
+    own = formula(
+        [make_node("quotient_or_nan", x, y), make_node("quotient_or_zero", x, y), make_node("sqrt", -x)], ("x", "y")
+    )
     at = {"x": 1.0, "y": 0.0}
     s = ca.SX.sym("x", 2)
     written = ca.Function("f", [s], [ca.vertcat(*values(own, {"x": s[0], "y": s[1]}))])
     assert np.isnan(np.array(values(own, at), dtype=float)).all()
     assert np.isnan(np.array(written([1.0, 0.0])).ravel()[[0, 2]]).all()
     assert not any(flint.arb(x).is_finite() for x in values(own, {n: flint.arb(v) for n, v in at.items()}))
-    nothing = formula([make_node("ratio", x, y)], ("x", "y"))
+    nothing = formula([make_node("quotient_or_zero", x, y)], ("x", "y"))
     for zero in (0.0, np.zeros(3), flint.arb(0), flint.fmpq(0)):
         assert np.all(np.array([values(nothing, {"x": zero, "y": zero})[0] == 0]))
 
@@ -190,7 +192,7 @@ def test_a_truth_among_numbers_is_1_or_0_of_every_kind():
         2 * (x < y) + (x <= y),
         x < y,
         make_node("choose", x - y, 5, 7),
-        make_node("choose", make_node("both", x < 2, y), 5, 7),
+        make_node("choose", make_node("and", x < 2, y), 5, 7),
     ]
     slopes = formula([*(s for each in kinks for s in each), *others], "xy")
     for at, wanted in {

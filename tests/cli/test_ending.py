@@ -16,7 +16,7 @@ import casadi as ca
 import pytest
 
 from tmsopt.global_search import SCIP
-from tmsopt.killable import Killable
+from tmsopt.killable import KillableProcess
 
 pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="signals and shells of POSIX"),
@@ -285,7 +285,7 @@ def test_what_is_said_beside_a_design_may_be_stopped(run, monkeypatch):
 @pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 def test_what_a_global_solver_raises_is_heard(run, monkeypatch, tmp_path):
     race = import_module("tmsopt.global_search.race")
-    process = Killable()
+    process = KillableProcess()
     try:
         failed = process.call(math.sqrt, SimpleNamespace())
         assert str(failed.exception()) == "must be real number, not types.SimpleNamespace"

@@ -10,7 +10,7 @@ from helpers import shares
 
 import tmsopt
 from tmsopt import InputError
-from tmsopt.executor import EngineError, here, processes
+from tmsopt.executor import EngineError, in_process, processes
 from tmsopt.models import tms
 
 curve = import_module("tmsopt.fronts.curve")
@@ -29,7 +29,7 @@ def map_items(function, items, workers):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("workers", [here, lambda: processes(3)])
+@pytest.mark.parametrize("workers", [in_process, lambda: processes(3)])
 def test_every_item_has_its_answer(workers):
     with workers() as side_by_side:
         found = map_items(shares.squared, range(9), side_by_side)
@@ -56,7 +56,7 @@ def test_what_cannot_be_sent_is_solved_here():
 
 
 def test_what_was_done_before_an_interrupt_is_kept_and_the_team_can_go_on():
-    with here() as side_by_side:
+    with in_process() as side_by_side:
         found = []
         with pytest.raises(KeyboardInterrupt):
             found.extend(subproblems.map_items(side_by_side, shares.interrupted_at_two, ASK, range(4)))

@@ -127,7 +127,7 @@ def test_quantities_in_layers_are_walked_once_each():
 
 
 def test_a_chain_of_quantities_as_long_as_is_read():
-    most = import_module("tmsopt.models.stated.texts").MOST_QUANTITIES
+    most = import_module("tmsopt.models.stated.texts").MAX_QUANTITIES
     limit = sys.getrecursionlimit()
 
     def chain(count):

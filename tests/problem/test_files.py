@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import tmsopt
-from tmsopt.files import LARGEST
+from tmsopt.files import MAX_FILE_BYTES
 from tmsopt.problem import as_solvable
 
 STUDIES = set(Path("problems").glob("study_*.toml"))
@@ -143,7 +143,7 @@ def test_same_faults_from_python():
 
 
 UNREADABLE = {
-    "huge": b"# " + b"x" * (10 * LARGEST),
+    "huge": b"# " + b"x" * (10 * MAX_FILE_BYTES),
     "not text": b'title = "\xff\xfe"\n',
     "nul": b"title = \x00\n",
     "empty": b"",

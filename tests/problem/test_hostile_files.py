@@ -61,8 +61,8 @@ def test_the_first_faults_are_listed_and_the_rest_is_counted(tmp_path, entry, li
     text = GOOD + "".join(entry.format(k) + "\n" for k in range(10_000))
     found = refused(tmp_path / "p.toml", text)
     assert line in found[0]
-    assert len(found) == errors.LISTED + 1
-    assert int(found[-1].removeprefix("and ").removesuffix(" more")) + errors.LISTED >= 10_000
+    assert len(found) == errors.MAX_LISTED + 1
+    assert int(found[-1].removeprefix("and ").removesuffix(" more")) + errors.MAX_LISTED >= 10_000
 
 
 def test_a_text_of_several_lines_and_a_list_do_not_move_the_lines(tmp_path):
@@ -178,10 +178,10 @@ def test_a_file_that_names_itself(tmp_path):
 
 def test_the_limit_of_a_file_is_stated(tmp_path):
     path = tmp_path / "p.toml"
-    path.write_text(GOOD + "#" * (files.LARGEST - len(GOOD)), encoding="utf-8")
+    path.write_text(GOOD + "#" * (files.MAX_FILE_BYTES - len(GOOD)), encoding="utf-8")
     assert tmsopt.load(path).fixed
     assert refused(path, path.read_bytes() + b"#") == [
-        f"{path}: is larger than {files.LARGEST} bytes; accepted: a TOML problem file of less"
+        f"{path}: is larger than {files.MAX_FILE_BYTES} bytes; accepted: a smaller TOML problem file"
     ]
 
 

@@ -51,7 +51,7 @@ def test_a_solve_normalises_once_and_parses_each_text_once(monkeypatch):
     monkeypatch.setattr(
         parser.Expression, "__init__", lambda self, text, *x, **y: (read.append(text), plain(self, text, *x, **y))[0]
     )
-    for parse in (parser._value, parser._comparison):
+    for parse in (parser._parse_value_text, parser._parse_comparison_text):
         parse.cache_clear()
     tmsopt.solve("problems/realistic.toml")
     assert len(made) == 1

@@ -401,13 +401,13 @@ def test_a_basin_that_many_starts_miss():
 def children(monkeypatch):
     """The processes that are started, none of which is left at the end."""
     seen = []
-    start = started.start
+    start = started.start_process
 
     def noted(*given):
         seen.append(start(*given))
         return seen[-1]
 
-    monkeypatch.setattr(started, "start", noted)
+    monkeypatch.setattr(started, "start_process", noted)
     yield seen
     assert seen
     assert all(child.poll() is not None for child in seen)
@@ -444,7 +444,7 @@ def test_a_process_that_crashes_costs_no_result(slow_plane, monkeypatch):
         crashed.append(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE))
         return crashed[-1]
 
-    monkeypatch.setattr(started, "start", crash)
+    monkeypatch.setattr(started, "start_process", crash)
     before = len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0
     began = time.perf_counter()
     design = certify(slow_plane, seconds=1.0)
@@ -458,7 +458,7 @@ def test_a_process_that_crashes_costs_no_result(slow_plane, monkeypatch):
 
 def test_one_crash_of_two(slow_plane, monkeypatch, children):
     """The other one answers."""
-    start = started.start
+    start = started.start_process
 
     def every_other(*given):
         child = start(*given)
@@ -466,7 +466,7 @@ def test_one_crash_of_two(slow_plane, monkeypatch, children):
             child.kill()
         return child
 
-    monkeypatch.setattr(started, "start", every_other)
+    monkeypatch.setattr(started, "start_process", every_other)
     prove_closed(slow_plane)
 
 

@@ -120,5 +120,5 @@ def test_shape_follows_the_leading_axes():
 
 @pytest.mark.parametrize("c", [[0.0, 1.0, 2.0], [1.0, np.nan, 2.0], [1.0, np.inf], [1.0], 3.0])
 def test_what_is_no_polynomial_is_refused(c):
-    with pytest.raises(ValueError, match="leading one other than 0"):
+    with pytest.raises(ValueError, match="leading one must not be 0"):
         real_roots(c)

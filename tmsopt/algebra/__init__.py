@@ -1,7 +1,8 @@
 """One formula for floats, arrays, CasADi expressions, fractions and balls (intervals with a midpoint and a radius).
 
 In: formulas written once as plain arithmetic, and numbers of any of these kinds. Out: values of the same kind,
-enclosures, and solutions proved by interval Newton. Open `kinds` first: it lists the operations of each kind of number.
+enclosures, and solutions that Krawczyk's interval Newton method proves. Open `kinds` first: it lists the operations of
+each kind of number.
 """
 
 import lazy_loader

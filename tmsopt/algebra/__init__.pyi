@@ -5,7 +5,7 @@ from .formula import (
     from_casadi as from_casadi, trace as trace,
 )
 from .intervals import (
-    EVERYTHING as EVERYTHING, ball as ball, bound_roots as bound_roots, interval as interval, ranges as ranges,
+    REAL_LINE as REAL_LINE, ball as ball, bound_roots as bound_roots, interval as interval, ranges as ranges,
 )
 from .kinds import (
     BALLS as BALLS, CASADI as CASADI, FLOATS as FLOATS, INTERVALS as INTERVALS, NODES as NODES, values as values,

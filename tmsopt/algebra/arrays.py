@@ -1,7 +1,7 @@
 """Evaluates a formula on large arrays, one block after another, so that the data stay in the cache.
 
-Shapes follow NumPy's broadcasting. A step that depends on a single axis is computed along it, in shape (1, n) or
-(m, 1); a step that depends on no axis is one number.
+Shapes follow NumPy's broadcasting. A step of the formula that depends on a single axis is computed along
+this axis, in shape (1, n) or (m, 1); a step that depends on no axis is one number.
 """
 
 import math
@@ -31,19 +31,18 @@ def evaluate_on_arrays(formula: Formula, numbers: Mapping[str, Any]) -> list[Any
     with np.errstate(all="ignore"):
         if math.prod(shape) <= BLOCK:
             return fold(formula, columns, FLOATS)
-        strides = {
-            n: np.broadcast_to(x, shape).strides for n, x in columns.items()
-        }  # 0 along an axis on which a column does not depend
+        # A stride is 0 along an axis on which a column does not depend.
+        strides = {n: np.broadcast_to(x, shape).strides for n, x in columns.items()}
         axes = [k for k, n in enumerate(shape) if n != 1]
-        large = set.intersection(*(formula.dependent_steps([n for n in columns if strides[n][k]]) for k in axes))
-        names, small, rest = formula.split(large)
-        inputs = columns | dict(zip(names, fold(small, columns, FLOATS), strict=True))
+        full_steps = set.intersection(*(formula.dependent_steps([n for n in columns if strides[n][k]]) for k in axes))
+        names, partial_formula, full_formula = formula.split(full_steps)  # full_steps depend on all axes
+        inputs = columns | dict(zip(names, fold(partial_formula, columns, FLOATS), strict=True))
         results = [inputs[str(o)] if str(o) in inputs else np.empty(shape) for o in formula.outputs]
-        large_outputs = [k for k, o in enumerate(formula.outputs) if o in large]
-        rest = rest.extract([rest.outputs[k] for k in large_outputs])
-        for block in _split_grid(shape) if large_outputs else ():
-            block_inputs = {name: _slice_block(inputs[name], *block) for name in rest.inputs}
-            for k, value in zip(large_outputs, fold(rest, block_inputs, FLOATS), strict=True):
+        full_outputs = [k for k, o in enumerate(formula.outputs) if o in full_steps]
+        full_formula = full_formula.extract([full_formula.outputs[k] for k in full_outputs])
+        for block in _split_grid(shape) if full_outputs else ():
+            block_inputs = {name: _slice_block(inputs[name], *block) for name in full_formula.inputs}
+            for k, value in zip(full_outputs, fold(full_formula, block_inputs, FLOATS), strict=True):
                 _slice_block(results[k], *block)[...] = value
     return results
 

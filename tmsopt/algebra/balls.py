@@ -2,7 +2,7 @@
 
 A ball is an exact fraction (`flint.fmpq`), an interval with a midpoint and a radius (`flint.arb`), a power series of
 these (`flint.arb_series`), a polynomial, or an array of numbers with error bounds (`rounding.Bounded`). The ball nan
-stands for a value that does not exist or that the balls are too wide to decide.
+stands for a value that does not exist, or whose existence cannot be decided because the balls are too wide.
 """
 
 from collections.abc import Sequence
@@ -19,9 +19,9 @@ from tmsopt.algebra.rounding import Bounded
 DIGITS = 60
 """Decimal digits of the working precision in most computations."""
 
-_LARGEST_EXPONENT = 2**20  # of 2, in a fraction that is made from a ball
+_MAX_EXPONENT = 2**20  # largest power of 2 in a fraction that is made from the midpoint of a ball
 
-GUARD = 5
+GUARD_DIGITS = 5
 """Decimal digits written in addition to the requested ones."""
 
 
@@ -55,25 +55,25 @@ class ProvedRoot:
 
 
 def number(ball: Any, digits: int) -> Number:
-    """A ball as a decimal of `digits` + `GUARD` digits, or of fewer digits if the radius of the ball is large."""
+    """A ball as a decimal of `digits` + `GUARD_DIGITS` digits, or of fewer if the radius of the ball is large."""
     if not ball.is_finite():
         return Number("nan", "inf")
     if ball == 0:
         return Number("0", "0")
-    middle, radius, exponent = (int(x) for x in ball.mid_rad_10exp(digits + 2 * GUARD))
-    drop = max(len(str(abs(middle))) - digits - GUARD, len(str(radius)) - 2, 0)
-    unit = 10**drop
+    middle, radius, exponent = (int(x) for x in ball.mid_rad_10exp(digits + 2 * GUARD_DIGITS))
+    dropped_digits = max(len(str(abs(middle))) - digits - GUARD_DIGITS, len(str(radius)) - 2, 0)
+    unit = 10**dropped_digits
     shortened = (middle + unit // 2) // unit
     radius += abs(middle - shortened * unit)
-    return Number(_format_decimal(shortened, exponent + drop), _format_radius(radius, exponent))
+    return Number(_format_decimal(shortened, exponent + dropped_digits), _format_radius(radius, exponent))
 
 
 def fraction(value: Fraction, digits: int) -> Number:
     """An exact fraction as a decimal, with radius 0 if the decimal terminates."""
     denominator = value.denominator
     if pow(10, denominator.bit_length(), denominator) == 0:
-        places = next(n for n in count() if 10**n % denominator == 0)
-        return Number(_format_decimal(int(value * 10**places), -places), "0")
+        decimals = next(n for n in count() if 10**n % denominator == 0)
+        return Number(_format_decimal(int(value * 10**decimals), -decimals), "0")
     return number(flint.arb(rational(value)), digits)
 
 
@@ -90,23 +90,23 @@ def _format_radius(radius: int, exponent: int) -> str:
     """radius · 10^exponent, rounded up to two digits."""
     if radius == 0:
         return "0"
-    upper = Context(prec=2, rounding=ROUND_UP).create_decimal(radius)
-    return f"{'.'.join(map(str, upper.as_tuple().digits))}e{upper.adjusted() + exponent}"
+    rounded_up = Context(prec=2, rounding=ROUND_UP).create_decimal(radius)
+    return f"{'.'.join(map(str, rounded_up.as_tuple().digits))}e{rounded_up.adjusted() + exponent}"
 
 
 def largest_radius(balls: Sequence[Any]) -> float:
     """Upper bound of the radii of balls."""
-    return max((upper(ball.rad()) for ball in balls), default=0.0)
+    return max((upper_bound(ball.rad()) for ball in balls), default=0.0)
 
 
-def upper(ball: Any) -> float:
+def upper_bound(ball: Any) -> float:
     """A double that is at least every number of a ball; the ball must be within the range of doubles."""
     top = ball.upper()
     value = float(top)
     return value if flint.arb(value) >= top else value * (1 + 2**-51) + 5e-324
 
 
-def lower(ball: Any) -> float:
+def lower_bound(ball: Any) -> float:
     """A double that is at most every number of a positive ball."""
     bottom = ball.lower()
     value = float(bottom)
@@ -115,7 +115,7 @@ def lower(ball: Any) -> float:
 
 @dataclass(frozen=True)
 class Tilt:
-    """An angle given by its tangent, the only function of it that coefficients use."""
+    """An angle given by its tangent. The coefficients use no other function of the angle."""
 
     tangent: Any
 
@@ -149,8 +149,8 @@ def rational(x: Any) -> flint.fmpq:
         return x
     if isinstance(x, flint.arb):
         mantissa, exponent = map(int, x.mid().man_exp())
-        if abs(exponent) <= _LARGEST_EXPONENT:
+        if abs(exponent) <= _MAX_EXPONENT:
             return x.mid().fmpq()
-        size = flint.fmpq(2) ** (_LARGEST_EXPONENT if exponent > 0 else -_LARGEST_EXPONENT)
+        size = flint.fmpq(2) ** (_MAX_EXPONENT if exponent > 0 else -_MAX_EXPONENT)
         return size if mantissa > 0 else -size
     return flint.fmpq(*Fraction(x).as_integer_ratio())

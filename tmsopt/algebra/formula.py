@@ -1,4 +1,4 @@
-"""Formulas as graphs with exact constants, and one fold that evaluates them in numbers of any kind.
+"""Formulas as graphs with exact constants, and the function `fold`, which evaluates them in numbers of any kind.
 
 A formula comes from a Python function on nodes (`trace`), from text (`tmsopt.models.expression`) or from a CasADi
 function (`from_casadi`). A kind of number defines the operations; see `kinds`.
@@ -20,8 +20,8 @@ INPUT, CONSTANT = "input", "constant"
 Constant = Union[Fraction, float, "Formula"]
 """A fraction; a formula without inputs for an irrational number, as √2 or π; a float for nan and infinities only."""
 
-_LARGEST_POWER = 64  # exponent up to which a power of fractions is multiplied out
-_LARGEST_BITS = 2**12  # of such a power
+_MAX_EXPONENT = 64  # a power of fractions with a larger exponent is not computed
+_MAX_BITS = 2**12  # a power of fractions with more bits is not computed
 
 
 class UnsupportedOperation(ValueError):
@@ -33,7 +33,7 @@ class Step(NamedTuple):
 
     Attributes:
         op: ``input``, ``constant``, or the name of an operation such as ``add``.
-        operands: indices of the steps whose results it takes.
+        operands: indices of the steps whose results the operation takes.
         value: the name of an input, or the constant.
     """
 
@@ -47,8 +47,8 @@ class Formula:
     """Outputs as functions of inputs, for numbers of any kind.
 
     Attributes:
-        names: names of all inputs, also of those that no step uses.
-        steps: the operations, each once, in an order in which they can be computed.
+        names: names of all inputs, even if no step uses them.
+        steps: the inputs, constants and operations, each once; a step uses only results of earlier steps.
         outputs: indices of the steps whose results are the outputs.
     """
 
@@ -64,31 +64,31 @@ class Formula:
         return hash((self.names, self.steps, self.outputs))
 
     def extract(self, outputs: Sequence[int], inputs: Collection[int] = ()) -> "Formula":
-        """The formula of some steps; the steps `inputs` become inputs, whose names are their indices."""
-        used = set(outputs)
+        """The formula of some steps. The steps in `inputs` become inputs, and their indices become the names."""
+        used_steps = set(outputs)
         for k in range(len(self.steps) - 1, -1, -1):
-            if k in used and k not in inputs:
-                used.update(self.steps[k].operands)
-        position = {k: number for number, k in enumerate(sorted(used))}
+            if k in used_steps and k not in inputs:
+                used_steps.update(self.steps[k].operands)
+        new_index = {k: number for number, k in enumerate(sorted(used_steps))}
         steps = [
             Step(INPUT, (), str(k))
             if k in inputs
-            else self.steps[k]._replace(operands=tuple(map(position.__getitem__, self.steps[k].operands)))
-            for k in position
+            else self.steps[k]._replace(operands=tuple(map(new_index.__getitem__, self.steps[k].operands)))
+            for k in new_index
         ]
-        return Formula(self.names, tuple(steps), tuple(map(position.__getitem__, outputs)))
+        return Formula(self.names, tuple(steps), tuple(map(new_index.__getitem__, outputs)))
 
-    def split(self, late: Collection[int]) -> tuple[tuple[str, ...], "Formula", "Formula"]:
-        """Split the formula into early and late steps.
+    def split(self, late_steps: Collection[int]) -> tuple[tuple[str, ...], "Formula", "Formula"]:
+        """Split the formula into late steps and all other steps, which are early.
 
-        Constants stay with the late steps that use them, so that an exponent stays a number that has no derivative.
+        Constants stay with the late steps that use them: an exponent must stay a number, which has no derivative.
 
         Returns:
             Names of the early results that late steps and outputs use, the formula of these results, and the formula of
-            the outputs in terms of them.
+            the outputs with the early results as inputs.
         """
-        used = {o for k in late for o in self.steps[k].operands if self.steps[o].op != CONSTANT} | set(self.outputs)
-        sources = sorted(k for k in used if k not in late)
+        operands = {o for k in late_steps for o in self.steps[k].operands if self.steps[o].op != CONSTANT}
+        sources = sorted(k for k in operands | set(self.outputs) if k not in late_steps)
         return tuple(map(str, sources)), self.extract(sources), self.extract(self.outputs, sources)
 
     def dependent_steps(self, names: Collection[str]) -> set[int]:
@@ -110,18 +110,18 @@ class Formula:
         return [step.value for step in self.steps if step.op == CONSTANT]
 
     @cached_property
-    def dead(self) -> tuple[tuple[int, ...], ...]:
-        """For each step, the operands that no later step uses."""
-        last = {o: k for k, step in enumerate(self.steps) for o in step.operands}
-        dead: list[list[int]] = [[] for _ in self.steps]
-        for o, k in last.items():
+    def last_used(self) -> tuple[tuple[int, ...], ...]:
+        """For each step, the operands that no later step uses and that are not outputs."""
+        last_step = {o: k for k, step in enumerate(self.steps) for o in step.operands}
+        last_used: list[list[int]] = [[] for _ in self.steps]
+        for o, k in last_step.items():
             if o not in self.outputs:
-                dead[k].append(o)
-        return tuple(map(tuple, dead))
+                last_used[k].append(o)
+        return tuple(map(tuple, last_used))
 
     @cached_property
-    def uses(self) -> tuple[int, ...]:
-        """How often other steps use the result of each step."""
+    def use_counts(self) -> tuple[int, ...]:
+        """For each step, how often other steps use its result."""
         counts = Counter(chain.from_iterable([step.operands for step in self.steps]))
         return tuple(map(counts.__getitem__, range(len(self.steps))))
 
@@ -142,19 +142,20 @@ class Kind:
 
 
 def fold(
-    formula: Formula, values: Mapping[str, Any], kind: Kind, shared: Callable[[Any], Any] | None = None
+    formula: Formula, values: Mapping[str, Any], kind: Kind, share: Callable[[Any], Any] | None = None
 ) -> list[Any]:
-    """Evaluate a formula in numbers of a kind.
+    """Evaluate a formula in numbers of one kind.
 
     Args:
         values: name of an input → number.
-        shared: applied to every result that is used more than once.
+        share: function that replaces every result of an operation that is used more than once.
 
     Raises:
-        UnsupportedOperation: for an operation that the kind does not have.
+        UnsupportedOperation: if the kind does not have an operation of the formula.
     """
     operations, results = kind.operations, list[Any]()
-    for (op, operands, value), dead, uses in zip(formula.steps, formula.dead, formula.uses, strict=True):
+    steps = zip(formula.steps, formula.last_used, formula.use_counts, strict=True)
+    for (op, operands, value), last_used, use_count in steps:
         if op == INPUT:
             result = kind.number(values[value])
         elif op == CONSTANT:
@@ -166,19 +167,21 @@ def fold(
                 result = operation(results[operands[0]], results[operands[1]])
             else:
                 result = operation(*map(results.__getitem__, operands))
-            if shared and uses > 1:
-                result = shared(result)
+            if share and use_count > 1:
+                result = share(result)
         results.append(result)
-        for o in dead:
-            results[o] = None  # frees arrays early, so that the others stay in the cache
+        for o in last_used:
+            results[o] = None  # frees arrays early, so that the other arrays stay in the cache
     return [results[o] for o in formula.outputs]
 
 
-_TOTAL = {INPUT, CONSTANT, "add", "sub", "mul", "neg", "square", "abs", "min", "max", "sin", "cos", "atan", "exp"}
+_TOTAL_OPERATIONS = {INPUT, CONSTANT, "add", "sub", "mul", "neg", "square"}
+_TOTAL_OPERATIONS |= {"abs", "min", "max", "sin", "cos", "atan", "exp"}
+"""Operations that have a value for all numbers."""
 
 
 def _operators(op: str) -> tuple[Callable[["Node", Any], "Node"], Callable[["Node", Any], "Node"]]:
-    """An operation as a method of its first operand, and as a method of its second operand."""
+    """Two methods of `Node`: the operation with the node as the first operand, and with the node as the second one."""
     return lambda self, other: make_node(op, self, other), lambda self, other: make_node(op, other, self)
 
 
@@ -189,18 +192,18 @@ class Node:
     becomes 0 if x always has a value. A factor 0.0 stays, since 0.0 times infinity is nan.
 
     Attributes:
-        fixed: whether it depends on no input.
-        total: whether it has a value wherever its inputs have one.
+        is_fixed: whether the node depends on no input.
+        is_total: whether the node has a value wherever all inputs have one.
     """
 
-    __slots__ = ("fixed", "op", "operands", "total", "value")
+    __slots__ = ("is_fixed", "is_total", "op", "operands", "value")
 
     def __init__(self, op: str, operands: tuple["Node", ...] = (), value: Any = None) -> None:
         self.op, self.operands, self.value = op, operands, value
-        self.fixed: bool = op != INPUT
-        self.total: bool = op in _TOTAL
+        self.is_fixed: bool = op != INPUT
+        self.is_total: bool = op in _TOTAL_OPERATIONS
         for o in operands:
-            self.fixed, self.total = self.fixed and o.fixed, self.total and o.total
+            self.is_fixed, self.is_total = self.is_fixed and o.is_fixed, self.is_total and o.is_total
 
     def __bool__(self) -> bool:
         raise TypeError("a formula cannot branch on the value of a number; write choose(condition, a, b)")
@@ -212,8 +215,8 @@ class Node:
     __pow__, __rpow__ = _operators("pow")
     __lt__, __gt__ = _operators("less")
     __le__, __ge__ = _operators("at_most")
-    __and__, __rand__ = _operators("both")
-    __or__, __ror__ = _operators("either")
+    __and__, __rand__ = _operators("and")
+    __or__, __ror__ = _operators("or")
     __eq__ = _operators("equal")[0]  # type: ignore[assignment]
 
     def __ne__(self, other: object) -> "Node":  # type: ignore[override]
@@ -253,7 +256,7 @@ PI = Node("pi")
 
 
 def constant(x: Any) -> Node:
-    """A number as a node. A float stands for the decimal that prints it."""
+    """A number as a node. A float means its shortest decimal."""
     if isinstance(x, Node):
         return x
     if isinstance(x, float):
@@ -271,15 +274,16 @@ def make_node(op: str, *arguments: Any) -> Node:
         is_fraction = o.op == CONSTANT and isinstance(o.value, Fraction) and not (isinstance(x, float) and x == 0)
         operands += (o,)
         fractions.append(o.value if is_fraction else None)
-    if op in _EXACT and None not in fractions and (number := _EXACT[op](*fractions)) is not None:
+    compute_fraction = _FRACTION_OPERATIONS.get(op) if None not in fractions else None
+    if compute_fraction and (number := compute_fraction(*fractions)) is not None:
         return Node(CONSTANT, (), number)
     simplified = _simplify(op, operands, fractions) if op in _SIMPLIFIABLE else None
     return Node(op, operands) if simplified is None else simplified
 
 
-_CONDITIONS = {"less", "at_most", "equal", "negligible", "both", "either", "not"}
-_CONDITION_OPERANDS = {"choose": 1, "both": 2, "either": 2, "not": 1}
-"""Operation → number of its first operands that are conditions; all other operands are numbers."""
+_CONDITIONS = {"less", "at_most", "equal", "negligible", "and", "or", "not"}
+_CONDITION_OPERANDS = {"choose": 1, "and": 2, "or": 2, "not": 1}
+"""Operation → how many operands, from the first on, are conditions; all other operands are numbers."""
 
 
 def _as_condition(x: Node) -> Node:
@@ -292,12 +296,12 @@ def _as_number(x: Node) -> Node:
 
 
 def _power(a: Fraction, b: Fraction) -> Fraction | None:
-    is_computed = b.denominator == 1 and abs(b) <= _LARGEST_POWER and (a != 0 or b > 0)
+    is_computed = b.denominator == 1 and abs(b) <= _MAX_EXPONENT and (a != 0 or b > 0)
     bits = max(a.numerator.bit_length(), a.denominator.bit_length())
-    return a ** int(b) if is_computed and bits * abs(b) <= _LARGEST_BITS else None
+    return a ** int(b) if is_computed and bits * abs(b) <= _MAX_BITS else None
 
 
-_EXACT: Mapping[str, Callable[..., Fraction | None]] = {
+_FRACTION_OPERATIONS: Mapping[str, Callable[..., Fraction | None]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
     "mul": lambda a, b: a * b,
@@ -307,24 +311,24 @@ _EXACT: Mapping[str, Callable[..., Fraction | None]] = {
     "abs": abs,
     "pow": _power,
 }
-"""Operations that give a fraction for fractions; None if the result is no fraction."""
+"""Operation → its function of fractions, which returns None if the result is not a fraction."""
 
 _SIMPLIFIABLE = {"add", "sub", "mul", "div", "pow", "neg", "exp", "sin", "cos", "tan", "asin", "atan"}
 
 
 def _simplify(op: str, operands: tuple[Node, ...], fractions: Sequence[Fraction | None]) -> Node | None:  # noqa: PLR0911, PLR0912
-    """A simpler node that is equal for all numbers; None if there is none."""
+    """A simpler node that is equal for all numbers; None if no rule applies."""
     first, last = operands[0], operands[-1]
     match op, *fractions:
         case ("add", 0, _) | ("mul", 1, _):
             return last
         case ("add" | "sub", _, 0) | ("mul" | "div" | "pow", _, 1) | ("sin" | "tan" | "asin" | "atan", 0):
             return first
-        case ("mul", 0, _) | ("mul", _, 0) if first.total and last.total:
+        case ("mul", 0, _) | ("mul", _, 0) if first.is_total and last.is_total:
             return constant(0)
-        case ("pow", _, 0) | ("exp" | "cos", 0) if first.total:
+        case ("pow", _, 0) | ("exp" | "cos", 0) if first.is_total:
             return constant(1)
-        case ("sub", _, _) if first is last and first.total:
+        case ("sub", _, _) if first is last and first.is_total:
             return constant(0)
         case ("sub", 0, _) | ("mul", -1, _):
             return -last
@@ -355,7 +359,7 @@ def _list_steps(outputs: Sequence[Node], names: Iterable[str] = (), nested: bool
     """The formula of nodes, with equal steps merged.
 
     Args:
-        nested: whether a node without inputs becomes one constant, a formula of its own.
+        nested: whether a node that depends on no input becomes one constant, whose value is a formula.
     """
     indices: dict[Step, int] = {}
     node_indices: dict[int, int] = {}  # id of a node → index; the outputs keep the nodes alive
@@ -364,7 +368,7 @@ def _list_steps(outputs: Sequence[Node], names: Iterable[str] = (), nested: bool
         node = pending_nodes.pop()
         if id(node) in node_indices:
             continue
-        if nested and node.fixed and node.op != CONSTANT:
+        if nested and node.is_fixed and node.op != CONSTANT:
             step = Step(CONSTANT, (), _list_steps([node], nested=False))
         elif node_indices.keys() >= set(map(id, node.operands)):
             step = Step(node.op, tuple(map(node_indices.__getitem__, map(id, node.operands))), node.value)
@@ -373,8 +377,8 @@ def _list_steps(outputs: Sequence[Node], names: Iterable[str] = (), nested: bool
             continue
         node_indices[id(node)] = indices.setdefault(step, len(indices))
     inputs = [step.value for step in indices if step.op == INPUT]
-    places = tuple(map(node_indices.__getitem__, map(id, outputs)))
-    return Formula(tuple(dict.fromkeys((*names, *inputs))), tuple(indices), places)
+    output_indices = tuple(map(node_indices.__getitem__, map(id, outputs)))
+    return Formula(tuple(dict.fromkeys((*names, *inputs))), tuple(indices), output_indices)
 
 
 def trace(function: Callable[[Mapping[str, Node]], Iterable[Any]], names: Sequence[str]) -> Formula:
@@ -386,7 +390,7 @@ def from_casadi(function: ca.Function, names: Sequence[str] = ()) -> Formula:
     """The formula of a CasADi function; the entries of all its inputs, and of all its outputs, form one list.
 
     Args:
-        names: of the inputs; by default their indices.
+        names: names of the inputs; by default their indices.
     """
     names = names or tuple(map(str, range(function.nnz_in())))
     return formula(nodes_from_casadi(function, names), names)
@@ -416,7 +420,7 @@ def _convert_operation(operation: int, operands: Sequence[Node]) -> Node:
     """A CasADi operation as a node. An unknown operation keeps its name, and no kind of number supports it."""
     if operation in _REWRITES:
         return _REWRITES[operation](operands[0], operands[-1])
-    return _make_by_alias(_NAMES.get(operation, f"operation {operation}"), *operands)
+    return _make_by_alias(_CASADI_NAMES.get(operation, f"operation {operation}"), *operands)
 
 
 def _make_by_alias(name: str, *operands: Any) -> Node:
@@ -431,9 +435,10 @@ _REWRITES: Mapping[int, Callable[[Node, Node], Node]] = {
     ca.OP_SIGN: lambda a, b: make_node("sub", a > 0, a < 0),
     ca.OP_IF_ELSE_ZERO: lambda a, b: make_node("choose", a, b, 0),
 }
-"""CasADi operations written with other operations."""
+"""Number of a CasADi operation that has no name here → a function that builds it from other operations."""
 
-_NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
+_CASADI_NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
+"""Number of an operation in CasADi → its name."""
 
 _ALIASES = {
     "subtract": "sub",
@@ -451,7 +456,5 @@ _ALIASES = {
     "lt": "less",
     "le": "at_most",
     "eq": "equal",
-    "and": "both",
-    "or": "either",
 }
 """Name in NumPy or CasADi → name of the operation."""

@@ -1,7 +1,8 @@
 """Decides whether an expression is 0 for all values of its symbols, by normal forms of rational functions.
 
 Each value of a function that is not rational, such as sin x, is an additional unknown. These relations between unknowns
-are used: sin² + cos² = 1, tan = sin/cos, (√x)² = x and |x|² = x². Other reasons for being 0 are not recognised.
+are used: sin² + cos² = 1, tan = sin/cos, (√x)² = x and |x|² = x². An expression that is 0 for another reason is not
+recognised as 0.
 """
 
 import math
@@ -30,8 +31,8 @@ from tmsopt.algebra.formula import (
 )
 from tmsopt.algebra.kinds import ARITHMETIC, NODES
 
-_LARGEST_POWER = 64  # largest exponent of a power that is multiplied out
-_MOST_PRODUCTS = 10**7  # of two terms, in one multiplication; more of them would take minutes and all memory
+_MAX_EXPONENT = 64  # a power with a larger exponent is not multiplied out
+_MAX_PRODUCTS = 10**7  # products of two terms in one multiplication; more would take minutes and all memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,14 +98,14 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
 
 
 def _multiply(a: Any, b: Any) -> Any:
-    if len(a) * len(b) > _MOST_PRODUCTS:
-        raise UnsupportedOperation(f"a formula of more than {_MOST_PRODUCTS} products")
+    if len(a) * len(b) > _MAX_PRODUCTS:
+        raise UnsupportedOperation(f"a formula of more than {_MAX_PRODUCTS} products")
     return a * b
 
 
 def _power(a: Any, n: int) -> Any:
-    if len(a) > 1 and math.comb(len(a) + n - 1, n) > math.isqrt(_MOST_PRODUCTS) * 10:
-        raise UnsupportedOperation(f"a formula of more than {_MOST_PRODUCTS} products")
+    if len(a) > 1 and math.comb(len(a) + n - 1, n) > math.isqrt(_MAX_PRODUCTS) * 10:
+        raise UnsupportedOperation(f"a formula of more than {_MAX_PRODUCTS} products")
     return a**n
 
 
@@ -113,14 +114,16 @@ class Field:
 
     def __init__(self, formula: Formula) -> None:
         formulas = [formula, *(step.value for step in formula.steps if isinstance(step.value, Formula))]
-        function_count = sum(step.op not in (INPUT, CONSTANT) for each in formulas for step in each.steps)
-        count = len(formula.names)
-        context = flint.fmpq_mpoly_ctx.get(tuple(f"x{k}" for k in range(count + 2 * function_count + 1)), "lex")
+        function_count = sum(step.op not in (INPUT, CONSTANT) for f in formulas for step in f.steps)
+        unknown_count = len(formula.names) + 2 * function_count + 1
+        context = flint.fmpq_mpoly_ctx.get(tuple(f"x{k}" for k in range(unknown_count)), "lex")
         self._context = context
         self.inputs = {name: self._generator(k) for k, name in enumerate(formula.names)}
-        self._nodes = [symbol(name) for name in formula.names]  # the meaning of each unknown
-        self._functions: list[tuple[str, tuple[Quotient, ...], Quotient]] = []  # name, operands, unknown
-        self._squares: list[tuple[int, Quotient]] = []  # index of an unknown, and its square
+        self._nodes = [symbol(name) for name in formula.names]  # index of an unknown → its meaning
+        self._functions: list[
+            tuple[str, tuple[Quotient, ...], Quotient]
+        ] = []  # each has a name, operands, and an unknown
+        self._squares: list[tuple[int, Quotient]] = []  # each has the index of an unknown, and its square
         self.kind = Kind(
             {
                 **{op: partial(self._apply, op) for op in NODES.operations},
@@ -161,14 +164,16 @@ class Field:
 
     def _factor_out(self, terms: Mapping[tuple[int, ...], Any]) -> Node:
         """A sum of terms with the most frequent unknown factored out, recursively."""
-        count = [sum(exponent > 0 for exponent in each) for each in zip(*terms, strict=True)]
-        if not any(count):
+        use_counts = [sum(exponent > 0 for exponent in exponents) for exponents in zip(*terms, strict=True)]
+        if not any(use_counts):
             return constant(terms[next(iter(terms))] if terms else 0)
-        k = max(range(len(count)), key=lambda j: (count[j], str(self._nodes[j].value if j < len(self._nodes) else "")))
+        names = [str(node.value) for node in self._nodes]
+        names += [""] * (len(use_counts) - len(names))
+        k = max(range(len(use_counts)), key=lambda j: (use_counts[j], names[j]))
         power = min(monomial[k] for monomial in terms if monomial[k])
-        inner = {(*m[:k], m[k] - power, *m[k + 1 :]): c for m, c in terms.items() if m[k]}
+        inner_terms = {(*m[:k], m[k] - power, *m[k + 1 :]): c for m, c in terms.items() if m[k]}
         remaining_terms = {m: c for m, c in terms.items() if not m[k]}
-        product = self._factor_out(inner) * self._nodes[k] ** int(power)
+        product = self._factor_out(inner_terms) * self._nodes[k] ** int(power)
         return product + self._factor_out(remaining_terms) if remaining_terms else product
 
     def _apply(self, operation: str, *operands: Quotient, square: Callable[[], Quotient] | None = None) -> Quotient:
@@ -189,10 +194,10 @@ class Field:
         return self._apply("sin", a, square=lambda: 1 - cosine * cosine)
 
     def _power(self, a: Quotient, b: Quotient) -> Quotient:
-        top, bottom = b.numerator, b.denominator
-        exponent = top.leading_coefficient() / bottom.leading_coefficient() if top else flint.fmpq(0)
-        is_integer = top.is_constant() and bottom.is_constant() and exponent.q == 1
-        if not is_integer or abs(exponent) > _LARGEST_POWER:
+        numerator, denominator = b.numerator, b.denominator
+        exponent = numerator.leading_coefficient() / denominator.leading_coefficient() if numerator else flint.fmpq(0)
+        is_integer = numerator.is_constant() and denominator.is_constant() and exponent.q == 1
+        if not is_integer or abs(exponent) > _MAX_EXPONENT:
             return self._apply("pow", a, b)
         return a ** int(exponent.p)
 
@@ -201,7 +206,7 @@ class Field:
 
 
 def multiply_out(formula: Formula) -> Formula:
-    """The formula as quotients of polynomials in lowest terms, in its inputs and its functions that are not rational.
+    """The formula as quotients of polynomials in lowest terms. Functions that are not rational count as inputs.
 
     Raises:
         UnsupportedOperation: if there would be too many terms.

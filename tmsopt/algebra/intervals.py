@@ -11,8 +11,8 @@ from tmsopt.algebra.kinds import INTERVALS
 
 Interval = tuple[float, float]
 
-EVERYTHING = (-math.inf, math.inf)
-_PRECISION = 64  # bits, 11 more than a double
+REAL_LINE = (-math.inf, math.inf)
+_PRECISION = 64  # bits of the balls, 11 more than a double has
 
 
 def ball(ends: Interval) -> Any:
@@ -25,7 +25,7 @@ def ball(ends: Interval) -> Any:
 def interval(x: Any) -> Interval:
     """Doubles that enclose a ball."""
     if not x.is_finite():
-        return EVERYTHING
+        return REAL_LINE
     return math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
 
 
@@ -38,7 +38,7 @@ def ranges(formula: Formula, box: Sequence[Interval]) -> list[Interval]:
     """Ranges of the outputs of a formula over a box; unbounded if an output may not exist.
 
     Raises:
-        UnsupportedOperation: for an operation that intervals lack.
+        UnsupportedOperation: if intervals do not have an operation of the formula.
     """
     balls = {name: ball(ends) for name, ends in zip(formula.names, box, strict=True)}
     return [interval(x) for x in fold(formula, balls, INTERVALS)]
@@ -47,7 +47,7 @@ def ranges(formula: Formula, box: Sequence[Interval]) -> list[Interval]:
 def bound_roots(coefficients: Sequence[Interval]) -> float:
     """Upper bound of |s| over the roots of all polynomials with coefficients in these intervals, descending.
 
-    The bound is that of Fujiwara, 2 max |a_k/a0|^(1/k) with half of |aₙ/a0| in the last term; inf if a0 may be 0.
+    Fujiwara's bound is 2 max |a_k/a0|^(1/k), where the last term has half of |aₙ/a0|. It is inf if a0 may be 0.
     """
     with flint.ctx.workprec(_PRECISION):
         a = [ball(ends) for ends in coefficients]

@@ -13,15 +13,15 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.balls import lower
+from tmsopt.algebra.balls import lower_bound
 from tmsopt.records import Table
 
 System = Callable[[Mapping[str, Any]], list[Any]]
 """Left-hand sides of the equations, as a function of balls or series by name."""
 
-_STEPS = 60  # of Newton's method
-_DECADES = 80  # powers of ten over which the radius of the box is reduced
-_BOXES_PER_DECADE = 4
+_MAX_STEPS = 60  # steps of Newton's method
+_DECADES = 80  # the radii of the boxes that are tried go from 1 down to 10^−80
+_BOXES_PER_DECADE = 4  # boxes that are tried for each power of ten
 
 
 class ProofFailed(ArithmeticError):
@@ -42,7 +42,7 @@ class Enclosure:
 
 
 def jacobian(system: System, point: Mapping[str, Any], names: Sequence[str]) -> Any:
-    """Jacobian of a system with respect to some of its names, one column for each, by first-order series."""
+    """Jacobian of a system, with one column for each of `names`, by power series of first order."""
     columns = [system({**point, n: flint.arb_series([point[n], 1], prec=2)}) for n in names]
     rows = zip(*columns, strict=True)
     return flint.arb_mat([[v[1] if isinstance(v, flint.arb_series) else flint.arb(0) for v in row] for row in rows])
@@ -51,7 +51,7 @@ def jacobian(system: System, point: Mapping[str, Any], names: Sequence[str]) -> 
 def refine_solution(
     system: System, start: Mapping[str, Any], names: Sequence[str], digits: int, units: Mapping[str, float] = Table()
 ) -> dict[str, Any]:
-    """Find the solution near a start by Newton's method at the working precision; the results are exact midpoints.
+    """Find the solution near a start by Newton's method at the working precision; the results are balls of radius 0.
 
     Args:
         digits: relative accuracy at which the iteration stops, in decimal digits.
@@ -62,7 +62,7 @@ def refine_solution(
     """
     point = dict(start)
     tolerance = flint.arb(10) ** -digits
-    for _ in range(_STEPS):
+    for _ in range(_MAX_STEPS):
         step = _solve_linear(jacobian(system, point, names), flint.arb_mat([[r.mid()] for r in system(point)]))
         sizes = [(abs(step[k, 0]).mid() / (units.get(n, 1) + abs(point[n]))).mid() for k, n in enumerate(names)]
         for k, n in enumerate(names):
@@ -72,13 +72,13 @@ def refine_solution(
         if all(s < tolerance for s in sizes):
             return point
     raise ProofFailed(
-        "Newton's method finds no solution near the design: the equations are singular there, or it is no solution"
+        "Newton's method finds no solution near the design: the equations are singular there, or no solution is near"
     )
 
 
-def _solve_linear(matrix: Any, right: Any) -> Any:
+def _solve_linear(matrix: Any, right_side: Any) -> Any:
     try:
-        return matrix.mid().solve(right).mid()
+        return matrix.mid().solve(right_side).mid()
     except ZeroDivisionError:
         raise ProofFailed("the Jacobian of the equations is singular there: the solution is not isolated") from None
 
@@ -88,7 +88,7 @@ def enclose_solution(
 ) -> Enclosure:
     """Enclose the solution near a midpoint that is correct to `digits` digits.
 
-    The smallest box that proves the solution gives the balls, the largest one the uniqueness.
+    The smallest box that proves the solution gives the balls, and the largest box gives `uniqueness`.
 
     Args:
         units: see `refine_solution`.
@@ -103,7 +103,7 @@ def enclose_solution(
     def apply_krawczyk(radii: Sequence[Any]) -> dict[str, Any] | None:
         """K(X) for the box of these radii, if it lies in the interior of the box."""
         offsets = [flint.arb(0, r.upper()) for r in radii]
-        box = {n: middle[n] + a for n, a in zip(names, offsets, strict=True)}  # or wider, by rounding
+        box = {n: middle[n] + a for n, a in zip(names, offsets, strict=True)}  # rounding makes it no smaller
         contraction = identity - inverse * jacobian(system, {**middle, **box}, names)
         images = (contraction * flint.arb_mat([[a] for a in offsets]) - step).entries()
         if not all(a.contains_interior(image) for a, image in zip(offsets, images, strict=True)):
@@ -111,8 +111,10 @@ def enclose_solution(
         return {n: middle[n] + image for n, image in zip(names, images, strict=True)}
 
     sizes = [flint.arb(units.get(n, 1)) for n in names]
-    inner = apply_krawczyk([flint.arb(10) ** -digits * (u + abs(middle[n])) for n, u in zip(names, sizes, strict=True)])
-    if inner is None:
+    enclosure = apply_krawczyk(
+        [flint.arb(10) ** -digits * (u + abs(middle[n])) for n, u in zip(names, sizes, strict=True)]
+    )
+    if enclosure is None:
         raise ProofFailed(
             "the Krawczyk test fails: the Jacobian of the equations is singular at the solution, or nearly so"
         )
@@ -122,7 +124,7 @@ def enclose_solution(
         for k in range(_BOXES_PER_DECADE)
     )
     radius = next((r for r in radii if apply_krawczyk([r * u for u in sizes])), flint.arb(0))
-    distances = [inner[n].rad() + abs(inner[n] - middle[n]).upper() for n in names]
+    distances = [enclosure[n].rad() + abs(enclosure[n] - middle[n]).upper() for n in names]
     if not radius > max(distance / u for distance, u in zip(distances, sizes, strict=True)):
-        raise ProofFailed("the Krawczyk test fails in every box but the smallest: the solution is hardly isolated")
-    return Enclosure(inner, lower(radius))
+        raise ProofFailed("the Krawczyk test fails in every box except the smallest: the solution is hardly isolated")
+    return Enclosure(enclosure, lower_bound(radius))

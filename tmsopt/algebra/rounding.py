@@ -13,12 +13,12 @@ from tmsopt.records import Array, Truth
 UNIT = 2 * np.finfo(float).eps
 """Relative rounding error of one operation, doubled to cover the rounding of the bounds themselves."""
 
-_LARGEST_POWER = 64  # largest exponent for which a power is a product
-_LARGEST_TANGENT_CHANGE = 0.1  # largest relative change of a tangent within its error for which the slope bounds it
+_MAX_EXPONENT = 64  # a power with a larger exponent is computed by logarithms
+_MAX_TANGENT_CHANGE = 0.1  # if a tangent may change more than this, relative to 1 + |tangent|, its error is infinite
 
 
 def _make_lipschitz(function: Callable[[Any], Any]) -> Callable[["Bounded"], "Bounded"]:
-    """The version for bounded numbers of a function whose slope is at most 1 everywhere."""
+    """Extend a function to numbers with error bounds; its slope must be at most 1 everywhere."""
     return lambda x: add_rounding(function(x.value), x.error)
 
 
@@ -38,7 +38,7 @@ class Bounded:
         return np.asarray(np.isfinite(self.value) & (self.error <= tolerance * np.abs(self.value)))
 
     def where(self, condition: Any, other: "Bounded") -> "Bounded":
-        """These numbers where a condition holds, the others elsewhere."""
+        """These numbers where a condition holds, and the numbers of `other` where it fails."""
         return Bounded(np.where(condition, self.value, other.value), np.where(condition, self.error, other.error))
 
     def __getitem__(self, index: Any) -> "Bounded":
@@ -71,9 +71,9 @@ class Bounded:
     def __truediv__(self, other: Any) -> "Bounded":
         b = as_bounded(other)
         quotient = self.value / b.value
-        room = np.abs(b.value) - b.error
-        error = (self.error + np.abs(quotient) * b.error) / np.where(room > 0, room, np.nan)
-        return add_rounding(quotient, np.where(room > 0, error, np.inf))
+        min_size = np.abs(b.value) - b.error
+        error = (self.error + np.abs(quotient) * b.error) / np.where(min_size > 0, min_size, np.nan)
+        return add_rounding(quotient, np.where(min_size > 0, error, np.inf))
 
     def __rtruediv__(self, other: Any) -> "Bounded":
         return as_bounded(other) / self
@@ -81,7 +81,7 @@ class Bounded:
     def __pow__(self, power: Any) -> "Bounded":
         exponent = as_bounded(power)
         n = float(exponent.value) if np.ndim(exponent.value) == 0 and not np.any(exponent.error) else np.nan
-        if not (n.is_integer() and abs(n) <= _LARGEST_POWER):
+        if not (n.is_integer() and abs(n) <= _MAX_EXPONENT):
             return (self.log() * exponent).exp()
         result = math.prod([self] * int(abs(n)), start=Bounded(np.ones_like(self.value)))
         return 1.0 / result if n < 0 else result
@@ -92,8 +92,8 @@ class Bounded:
     def sqrt(self) -> "Bounded":
         """Square roots; the error is infinite for numbers that may be negative."""
         root = np.sqrt(self.value)
-        uncertain = np.where(self.error == 0, 0.0, np.inf)
-        return add_rounding(root, np.where(self.value > self.error, self.error / root, uncertain))
+        error_near_zero = np.where(self.error == 0, 0.0, np.inf)
+        return add_rounding(root, np.where(self.value > self.error, self.error / root, error_near_zero))
 
     def root(self, degree: int) -> "Bounded":
         """Real roots of a degree; 0 for negative numbers if the degree is even."""
@@ -110,8 +110,9 @@ class Bounded:
 
     def log(self) -> "Bounded":
         """Natural logarithm; the error is infinite for numbers that may be negative."""
-        room = self.value - self.error
-        return add_rounding(np.log(self.value), np.where(room > 0, self.error / np.where(room > 0, room, 1.0), np.inf))
+        least = self.value - self.error
+        error = np.where(least > 0, self.error / np.where(least > 0, least, 1.0), np.inf)
+        return add_rounding(np.log(self.value), error)
 
     sin, cos, atan = map(_make_lipschitz, (np.sin, np.cos, np.arctan))
 
@@ -119,7 +120,7 @@ class Bounded:
         """Tangent."""
         value = np.tan(self.value)
         change = self.error * (1 + value * value)
-        is_small = change <= _LARGEST_TANGENT_CHANGE * (1 + np.abs(value))
+        is_small = change <= _MAX_TANGENT_CHANGE * (1 + np.abs(value))
         return add_rounding(value, np.where(is_small, 2 * change, np.inf))
 
     def asin(self) -> "Bounded":
@@ -132,8 +133,9 @@ class Bounded:
 
     def _arcsine_error(self) -> Array:
         """Error by the slope of the arcsine, infinite if the number may reach −1 or 1."""
-        room = 1 - np.abs(self.value) - self.error
-        return np.where(room > 0, self.error / np.sqrt(np.where(room > 0, room, 1.0)), np.inf)
+        distance_to_one = 1 - np.abs(self.value) - self.error
+        is_inside = distance_to_one > 0
+        return np.where(is_inside, self.error / np.sqrt(np.where(is_inside, distance_to_one, 1.0)), np.inf)
 
 
 def as_bounded(x: Any) -> Bounded:
@@ -153,7 +155,7 @@ def add_rounding(value: Any, error: Any) -> Bounded:
     return Bounded(value, error + UNIT * np.abs(value))
 
 
-def greater(a: Any, b: Any) -> Bounded:
+def maximum(a: Any, b: Any) -> Bounded:
     """The greater of two numbers, with the larger of the two errors."""
     a, b = as_bounded(a), as_bounded(b)
     return Bounded(np.maximum(a.value, b.value), np.maximum(a.error, b.error))

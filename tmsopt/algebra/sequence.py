@@ -1,4 +1,4 @@
-"""A quasi-random sequence, because importing scipy.stats.qmc takes longer than solving."""
+"""A quasi-random sequence. The module scipy.stats.qmc is not used, because its import takes longer than a solve."""
 
 import numpy as np
 

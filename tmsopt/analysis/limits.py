@@ -16,7 +16,7 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import Unit, common_unit, dimension_of, limit_text, unit_of
 from tmsopt.program.options import DEFAULTS
-from tmsopt.progress import Counts
+from tmsopt.progress import ReportCount
 from tmsopt.records import plain
 from tmsopt.search.solve import solve_any_status
 
@@ -94,7 +94,7 @@ class Lever:
         }
 
 
-def find_levers(solution: Solution, resolve: bool = True, progress: Counts | None = None) -> tuple[Lever, ...]:
+def find_levers(solution: Solution, resolve: bool = True, progress: ReportCount | None = None) -> tuple[Lever, ...]:
     """One lever for each active limit of an optimum; the most valuable lever comes first."""
     if solution.status != "optimal":
         return ()

@@ -7,7 +7,7 @@ import flint
 import numpy as np
 
 from tmsopt.models.exact import ExactDesign, as_exact_design
-from tmsopt.models.user_spectrum import beyond_axis
+from tmsopt.models.user_spectrum import distance_beyond_axis
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.stability import MultipleRoot, longest_chain_on_line
 from tmsopt.records import Array, Numbers
@@ -58,7 +58,7 @@ def find_edges(
         abscissa: the abscissa of the design, in doubles.
         meetings: the multiple roots of the design, in doubles.
     """
-    right_of_axis = beyond_axis(problem.model, problem.located if is_optimal else (), structure.roots)
+    right_of_axis = distance_beyond_axis(problem.model, problem.located if is_optimal else (), structure.roots)
     largest = max((r.size for r in structure.roots), default=0.0)
     if right_of_axis or (abs(structure.abscissa) > _MAX_ABSCISSA * largest and largest):
         return (), False

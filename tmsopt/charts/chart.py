@@ -25,8 +25,8 @@ from tmsopt.charts.survey import (
     plan_survey,
 )
 from tmsopt.deprecated import ignore_option
-from tmsopt.errors import InputError, call_faults, count_faults, input_error
-from tmsopt.executor import Crash, here, processes
+from tmsopt.errors import InputError, callback_faults, count_faults, input_error
+from tmsopt.executor import Crash, in_process, processes
 from tmsopt.files import as_path
 from tmsopt.problem.files import ProblemSource
 from tmsopt.problem.problem import Problem
@@ -233,7 +233,7 @@ def chart(
     More: docs/how_to/charts.md
     """
     faults = count_faults("workers", workers, 1, _MAX_WORKERS) + count_faults("tile", tile, 1)
-    if faults := faults + call_faults("progress", progress):
+    if faults := faults + callback_faults("progress", progress):
         raise InputError(faults)
     steps = start_steps(progress, "charting", "design") or (lambda *_: None)
     layer_names = layers if layers is not None else tuple(LAYERS) if folder is None else DEFAULT_LAYERS
@@ -246,7 +246,7 @@ def chart(
     grid.tiles(tile)  # raises an error for too many tiles
     memory = {} if path else {n: np.empty(grid.shape, dtype) for n, dtype in survey.dtypes.items()}
     tiles_context = write_folder(path, about, grid, fresh) if path else nullcontext(Tiles(memory, tile))
-    with tiles_context as tiles, processes(workers) if workers > 1 else here() as executor:
+    with tiles_context as tiles, processes(workers) if workers > 1 else in_process() as executor:
         start_time = time.perf_counter()
         remaining_tiles = [rows for rows in grid.tiles(tiles.tile) if rows.start not in tiles.tallies]
         finished_count = old_count = add_tallies(tiles.tallies.values()).designs

@@ -202,7 +202,7 @@ def write_new(option: str, path: Path, text: str) -> None:
         with report_writing(option, place):
             for file in group:
                 file.parent.mkdir(exist_ok=True)
-                write_text(file, files[file], new=True)
+                write_text(file, files[file], must_be_new=True)
 
 
 def print_or_write(text: str, path: Path | None) -> None:

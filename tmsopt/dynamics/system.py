@@ -123,7 +123,7 @@ def _build_bicycle_system(A: Array, mass: Array, problem: Posed, parameters: Map
     feedback = problem.model.feedback(native) if problem.model.feedback else None
     has_lag, driven = feedback is not None and feedback.lag is not None, dict[str, int]()
     if feedback is not None:
-        mass, driven = np.array(feedback.mass, dtype=float), {TORQUES[k]: k for k in sorted(feedback.driven)}
+        mass, driven = np.array(feedback.mass, dtype=float), {TORQUES[k]: k for k in sorted(feedback.driven_rows)}
     names = (*ANGLES, *RATES, *(driven if has_lag else ()))
     yaw_per_steer, yaw_per_steer_rate, v, w, contact_shift = map(float, contact_path(native))
     n = len(names)

@@ -25,7 +25,7 @@ from flint.utils.flint_exceptions import DomainError
 from tmsopt.algebra.balls import Tilt, as_ball, exact
 from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, fold, make_node, trace
 from tmsopt.algebra.intervals import ball
-from tmsopt.algebra.kinds import BALLS, quotient, values
+from tmsopt.algebra.kinds import BALLS, quotient_or_nan, values
 from tmsopt.models import Model, ParameterSet
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Bound
@@ -42,7 +42,8 @@ _MAX_FREE_COUNT = 12  # greatest number of free parameters; their box has 4096 c
 _EXTRA_DESIGNS = 8  # designs that check a relation, in addition to those that determine it
 _GRID_STEPS = 2**40  # steps of a range, from which random exact designs are chosen
 
-_RATIONAL_OPERATIONS = {INPUT, CONSTANT, "add", "sub", "neg", "mul", "square", "div", "quotient", "ratio"}
+_QUOTIENTS = {"div", "quotient_or_nan", "quotient_or_zero"}
+_RATIONAL_OPERATIONS = {INPUT, CONSTANT, "add", "sub", "neg", "mul", "square"} | _QUOTIENTS
 """Operations of rational functions; integer powers are also allowed."""
 
 _ExactEnds = Mapping[tuple[str, float], Any]
@@ -143,7 +144,7 @@ def _enclose_product(problem: Posed) -> float:
 
 def _bound_ratio(a: Sequence[Any]) -> float:
     """Upper end of the interval of |aₙ/a0|; inf if the quotient may not exist."""
-    upper = as_ball(abs(quotient(as_ball(a[-1]), as_ball(a[0])))).upper()
+    upper = as_ball(abs(quotient_or_nan(as_ball(a[-1]), as_ball(a[0])))).upper()
     return float(upper) if upper.is_finite() else math.inf
 
 

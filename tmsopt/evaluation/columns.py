@@ -93,7 +93,7 @@ def _evaluate_columns(problem: Posed, columns: Mapping[str, Array], reports: Seq
     bounded = {n: Bounded(x, np.abs(x) * _UNIT_ROUNDING) for n, x in parameters.items()}
     coefficients = [_broadcast(c, m) for c in coefficients_of(problem, bounded)]
     motions = enclose_motions(coefficients, STRUCTURE_TOLERANCE)
-    is_certain = motions.simple & _is_possible(problem, parameters)
+    is_certain = motions.are_simple & _is_possible(problem, parameters)
 
     def round_and_mark(number: Any) -> Array:
         nonlocal is_certain
@@ -162,7 +162,7 @@ def _is_possible(problem: Posed, parameters: Mapping[str, Any]) -> Truth:
 
 def _find_violations(problem: Posed, parameters: Mapping[str, Any], motions: Motions) -> tuple[dict[str, Array], Truth]:
     """The violation of each constraint, and whether a design is too close to a limit for this evaluation."""
-    m = len(motions.simple)
+    m = len(motions.are_simple)
     amounts, is_doubtful = {}, np.zeros(m, dtype=bool)
     names = list(dict.fromkeys(n for c in problem.conditions.values() for n in c.names))
     values = dict(zip(names, evaluate(problem, names, parameters), strict=True))

@@ -14,7 +14,7 @@ from typing import Any
 import flint
 
 from tmsopt.algebra.balls import exact
-from tmsopt.algebra.kinds import BALLS, greater, lesser
+from tmsopt.algebra.kinds import BALLS, ball_maximum, ball_minimum
 from tmsopt.evaluation.recheck import Evaluation
 from tmsopt.models import Model, Values
 from tmsopt.models.user_spectrum import user_roots
@@ -147,9 +147,9 @@ class _Design:
         if stored:
             yield ("abscissa_realised", ""), _find_rightmost(stored), 0
         if least_damped_roots and model.carrier is None:
-            known_values["damping_ratio"] = reduce(lesser, map(_compute_damping_ratio, least_damped_roots))
+            known_values["damping_ratio"] = reduce(ball_minimum, map(_compute_damping_ratio, least_damped_roots))
         if fastest_roots and ANGULAR_FREQUENCY in checked.quantities:
-            known_values[ANGULAR_FREQUENCY] = reduce(greater, (root.im for root in fastest_roots))
+            known_values[ANGULAR_FREQUENCY] = reduce(ball_maximum, (root.im for root in fastest_roots))
         if worst_roots:
             known_values["abscissa"] = _find_rightmost(worst_roots)
             yield ("abscissa", ""), known_values["abscissa"], 0
@@ -159,7 +159,7 @@ class _Design:
         nominal, abscissa, pi = self.values(Case()), known_values.get("abscissa", math.nan), flint.arb.pi()
         if parameter_set.rate is not None:
             rates = frequencies(fastest_roots, parameter_set.rate(self.exact), pi)
-            nominal = nominal.with_known({"frequency": reduce(greater, rates, flint.arb(0))})
+            nominal = nominal.with_known({"frequency": reduce(ball_maximum, rates, flint.arb(0))})
         nominal = nominal.with_known({"abscissa": abscissa, **known_values})
         yield from (
             (("quantities", n), nominal[n], 0) for n in checked.quantities if n in known_values or n not in ROOT_NAMES
@@ -173,7 +173,8 @@ class _Design:
             differs = depends_on_case(self.problem, objective, self.cases)
             cases = self.cases if differs else [Case()]
             objectives = [objective.of(self.values(case).with_known(known_values), BALLS) for case in cases]
-            yield ("value", ""), reduce(lesser if self.problem.sense == "maximize" else greater, objectives), 0
+            worst_of = ball_minimum if self.problem.sense == "maximize" else ball_maximum
+            yield ("value", ""), reduce(worst_of, objectives), 0
 
     def roots(self, is_last: bool) -> tuple[_Roots, Mapping[Case, _Roots]] | None:
         """The stored roots in the worst case, and for each case the roots of the nearest polynomial of its structure.
@@ -210,7 +211,7 @@ def _convert_exactly(table: Numbers) -> dict[str, Any]:
 
 
 def _find_rightmost(roots: _Roots) -> Any:
-    return reduce(greater, (root.re for root in roots))
+    return reduce(ball_maximum, (root.re for root in roots))
 
 
 def _compute_damping_ratio(root: EnclosedRoot) -> Any:

@@ -20,7 +20,7 @@ from tmsopt.problem.evaluate import coefficient_formula, nodes_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_QUANTITIES
 from tmsopt.roots import lienard_chipart
-from tmsopt.roots.numeric import GOOD
+from tmsopt.roots.numeric import GOOD_ERROR
 from tmsopt.roots.quartics import factors, quartic, signs
 
 
@@ -118,12 +118,12 @@ _OPERATIONS: Mapping[str, str] = {
     "less": "({0}<{1})",
     "at_most": "({0}<={1})",
     "equal": "({0}==={1})",
-    "both": "({0}&&{1})",
-    "either": "({0}||{1})",
+    "and": "({0}&&{1})",
+    "or": "({0}||{1})",
     "not": "(!{0})",
     "choose": "({0}?{1}:{2})",
-    "quotient": "({1}===0?NaN:{0}/{1})",
-    "ratio": "({0}===0?0:{1}===0?NaN:{0}/{1})",
+    "quotient_or_nan": "({1}===0?NaN:{0}/{1})",
+    "quotient_or_zero": "({0}===0?0:{1}===0?NaN:{0}/{1})",
     "positive_part": "(({0}+Math.abs({0}))/2)",
     "negligible": f"(Math.abs({{0}})<={ROUNDING!r}*{{1}})",
     "min": "Math.min({0},{1})",  # NaN if an operand is NaN
@@ -189,8 +189,8 @@ def _is_result(text: str) -> bool:
 
 
 # The formulas for roots of polynomials are not written again in JavaScript: the functions of Python are traced. For
-# this, their names `where` and `one` get another meaning. Formulas of quartics are from `tmsopt.roots.quartics`; the
-# conditions of stability for lower degrees are from `lienard_chipart`.
+# this, their names `where` and `as_integer` get another meaning. Formulas of quartics are from `tmsopt.roots.quartics`;
+# the conditions of stability for lower degrees are from `lienard_chipart`.
 
 _QUARTIC = 4
 
@@ -210,10 +210,10 @@ def kernel_script(degree: int) -> str:
         _trace_function("factorRoots", ["p", "q"], _FUNCTIONS.root_pair, "z"),
     ]
     if degree <= _QUARTIC:
-        is_stable = _FUNCTIONS.stable if degree == _QUARTIC else _is_stable
+        is_stable = _FUNCTIONS.is_stable_by_signs if degree == _QUARTIC else _is_stable
         parts.append(_trace_function("stableBySigns", a, lambda *c: [is_stable(*c)]))
     if degree == _QUARTIC:
-        rules = f"good: {GOOD}, accepted: {quartic.ACCEPTED}, steps: {quartic.STEPS}"
+        rules = f"good: {GOOD_ERROR}, accepted: {quartic.MAX_ERROR}, steps: {quartic.MAX_STEPS}"
         parts += [
             f"const QUARTIC = {{{rules}}};",
             _trace_function("quarticClass", a, _pack_classes),
@@ -228,18 +228,18 @@ _NAMESPACE: dict[str, Any] = {**vars(factors), **vars(signs)}
 for _name, _value in [*_NAMESPACE.items()]:
     if isinstance(_value, FunctionType):
         _NAMESPACE[_name] = FunctionType(_value.__code__, _NAMESPACE, _name)  # they call each other here
-_NAMESPACE |= {"where": _where, "one": lambda condition: _where(condition, 1, 0)}
+_NAMESPACE |= {"where": _where, "as_integer": lambda condition: _where(condition, 1, 0)}
 _FUNCTIONS = SimpleNamespace(**_NAMESPACE)
 
 
 def _start_roots(*a: Any) -> Sequence[Any]:
     monic = _FUNCTIONS.monic(*a)
-    quadratics = _FUNCTIONS.start(*monic)
+    quadratics = _FUNCTIONS.closed_form_factors(*monic)
     return [*monic, *quadratics, _FUNCTIONS.error(*monic, *quadratics)]
 
 
 def _step_roots(*numbers: Any) -> list[Any]:
-    quadratics = _FUNCTIONS.newton(*numbers)
+    quadratics = _FUNCTIONS.newton_step(*numbers)
     return [*quadratics, _FUNCTIONS.error(*numbers[:4], *quadratics)]
 
 

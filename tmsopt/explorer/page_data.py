@@ -14,7 +14,7 @@ from tmsopt.explorer.designs import PageDesign
 from tmsopt.explorer.javascript import Script, is_bicycle
 from tmsopt.guide import exact_value, toml_key, toml_text
 from tmsopt.models import Parameter, words_of
-from tmsopt.models.user_spectrum import ON_AXIS, eigenfrequencies
+from tmsopt.models.user_spectrum import AXIS_TOLERANCE, eigenfrequencies
 from tmsopt.problem import Posed, degrees_of_freedom, limit_value, unit_of
 from tmsopt.problem.validate import MIN_SIZE
 from tmsopt.records import Array
@@ -58,7 +58,7 @@ def make_page_data(
         "words": dict(words_of(problem.model)),
         "rootUnit": unit_of(problem, "abscissa").text,
         "carrier": problem.model.carrier,
-        "onAxis": ON_AXIS,
+        "onAxis": AXIS_TOLERANCE,
         "smallest": MIN_SIZE,
         "parameters": [_describe_parameter(problem, p, start[p.name]) for p in parameter_set.parameters],
         "quantities": [

@@ -8,7 +8,7 @@ from typing import Unpack
 import numpy as np
 
 from tmsopt.errors import MOST_POINTS, InputError, count_faults, input_error
-from tmsopt.executor import Executor, cores, here, processes
+from tmsopt.executor import Executor, cores, in_process, processes
 from tmsopt.fronts.curve import fill_curve
 from tmsopt.fronts.front import Front, FrontPoint
 from tmsopt.fronts.subproblems import (
@@ -82,7 +82,7 @@ def pareto(
     start_time = time.perf_counter()
     solver = FrontSolver(problem, replace(choices, progress=None))
     worker_count = min(workers or cores(), MAX_PARALLEL) if can_pickle(solver) else 1
-    with processes(worker_count) if worker_count > 1 else here() as executor:
+    with processes(worker_count) if worker_count > 1 else in_process() as executor:
         front = _compute_front(executor, solver, points, choices.progress or Steps(lambda _: None))
     if front.interrupted:
         note = f"the user stopped the search after {front.solved} sub-problems; the front holds the points found so far"

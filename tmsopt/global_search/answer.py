@@ -16,7 +16,7 @@ from tmsopt.global_search.tasks import FOUND, INFEASIBLE, UNDECIDED, Decision, T
 from tmsopt.problem.solution import Solution
 from tmsopt.program.formulate import design_of, variables_of
 from tmsopt.program.starts import initial_point
-from tmsopt.progress import Counts
+from tmsopt.progress import ReportCount
 
 _ROW_TOLERANCE = 1e-6  # relative to the range of a row: SCIP meets a row to 1e-9, but multiple roots lose digits
 _HALF_WIDTH = 1e-4  # half the width of the box around a known design, relative to the range of each variable
@@ -34,7 +34,7 @@ class Clock:
         note: what the proof has reached, in words; shown as progress.
     """
 
-    def __init__(self, seconds: float, pool: SolverPool, progress: Counts | None = None) -> None:
+    def __init__(self, seconds: float, pool: SolverPool, progress: ReportCount | None = None) -> None:
         self.seconds, self.pool, self.progress = seconds, pool, progress
         self.began = time.perf_counter()
         self.nodes, self.note = 0, ""

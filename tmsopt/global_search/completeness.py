@@ -31,7 +31,7 @@ from tmsopt.global_search.pruning import Box, BoxConditions, outer_doubles, prep
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import lifted_quantities
 from tmsopt.program.nlp import Scale, proof_units, scale_of
-from tmsopt.progress import Counts
+from tmsopt.progress import ReportCount
 from tmsopt.records import Array, Table, plain
 
 SECONDS = 60.0
@@ -95,7 +95,7 @@ class Completeness:
         return plain(self) | {"seconds": round(self.seconds, 4)}
 
 
-def prove_completeness(problem: Posed, seconds: float = SECONDS, progress: Counts | None = None) -> Completeness:
+def prove_completeness(problem: Posed, seconds: float = SECONDS, progress: ReportCount | None = None) -> Completeness:
     """Find all designs of a box with the pattern of a problem, and prove that there are no others.
 
     Boxes in the parameters and the unknowns of the pattern are contracted and split until interval arithmetic shows
@@ -144,7 +144,7 @@ class _ZeroSearch:
 
     end_time: float
     seconds: float
-    progress: Counts | None
+    progress: ReportCount | None
     box_count: int = 0
     stop_reason: str = ""
     zeros: list[_Zero] = field(default_factory=list)

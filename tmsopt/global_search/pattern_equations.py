@@ -15,7 +15,7 @@ import numpy as np
 
 from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.algebra.intervals import ranges, round_outwards
-from tmsopt.algebra.kinds import atan, quotient
+from tmsopt.algebra.kinds import atan, quotient_or_nan
 from tmsopt.models import Quantity, Values
 from tmsopt.models.expression import Expression
 from tmsopt.models.stated.pairs import Pair
@@ -111,7 +111,8 @@ def enumerate_pieces(name: str, is_complex: bool) -> Iterator[tuple[Piece, ...]]
 def _part_pieces(part: Component, is_complex: bool) -> Iterator[list[tuple[str, int, bool]]]:
     """Yield each choice for one part of a pattern: (kind, order, is_outer) for each of its factors."""
     if is_complex:
-        yield [("point", part.order, False) if part.kind == "CEP" else ("line", part.roots // 2, False)] * part.count
+        piece = ("point", part.order, False) if part.kind == "CEP" else ("line", part.root_count // 2, False)
+        yield [piece] * part.count
     elif part.kind == "capsize":
         yield [("zero", 1, False)]
     elif part.kind in ("weave", "resonance"):
@@ -284,8 +285,9 @@ def _abscissa(problem: Posed, pieces: Sequence[Piece], scale: Scale | RotatingFr
     (piece,) = pieces
     unit, own_unknowns = Fraction(scale.unit), piece.own_unknowns(u)
     if piece.kind in ("root", "point"):
-        return quotient(unit, own_unknowns[0]) if piece.is_outer else unit * own_unknowns[0]
-    return quotient(-unit * own_unknowns[0], 2 * own_unknowns[1]) if piece.is_outer else -unit * own_unknowns[0] / 2
+        return quotient_or_nan(unit, own_unknowns[0]) if piece.is_outer else unit * own_unknowns[0]
+    numerator = -unit * own_unknowns[0]
+    return quotient_or_nan(numerator, 2 * own_unknowns[1]) if piece.is_outer else numerator / 2
 
 
 def divisibility_conditions(a: Sequence[Any], pieces: Sequence[Piece], unknowns: Sequence[Any]) -> list[Any]:

@@ -322,7 +322,7 @@ _OPERATIONS = {
     "square": _Operation(_square, lambda a, r: (_add(a, a),), lambda r, a: _undo_absolute(_square_root(r), a)),
     "abs": _unary_operation("abs", _absolute, _undo_absolute),
     "sqrt": _unary_operation("sqrt", _square_root, lambda r, _: (_square(np.maximum(r, 0.0)),)),
-    **dict.fromkeys(("div", "quotient", "ratio"), _QUOTIENT),
+    **dict.fromkeys(("div", "quotient_or_nan", "quotient_or_zero"), _QUOTIENT),
     **{name: _unary_operation(name) for name in ("exp", "log", "sin", "cos", "tan", "atan")},
     **{name: _unary_operation(name, operand_ranges=lambda _, a: (_SIGNS,)) for name in ("asin", "acos")},
 }

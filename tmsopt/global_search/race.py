@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 
 from tmsopt.algebra.formula import UnsupportedOperation
 from tmsopt.global_search.tasks import INFEASIBLE, UNDECIDED, Decision, GlobalSolver, SolverFailed, Task
-from tmsopt.killable import Killable, ProcessEnded
+from tmsopt.killable import KillableProcess, ProcessEnded
 
 _POLL_SECONDS = 0.02  # time between polls
 _GRACE_SECONDS = 5.0  # time by which a solver may exceed its limit; SCIP does so while it solves a relaxation
@@ -21,7 +21,7 @@ class SolverPool:
 
     def __init__(self, solver: GlobalSolver) -> None:
         self._solver = solver
-        self._idle: list[Killable] = []
+        self._idle: list[KillableProcess] = []
 
     def __enter__(self) -> "SolverPool":
         return self
@@ -33,7 +33,7 @@ class SolverPool:
     def start_processes(self, count: int) -> None:
         """Start processes until `count` are idle."""
         while len(self._idle) < count:
-            self._idle.append(Killable(self._solver.prepare))
+            self._idle.append(KillableProcess(self._solver.prepare))
 
     def race(self, tasks: Sequence[Task], tick: Callable[[], None] = lambda: None) -> list[Decision]:
         """Decide tasks in parallel until one is infeasible.
@@ -48,7 +48,7 @@ class SolverPool:
         """
         self.start_processes(len(tasks))
         began = time.monotonic()
-        running: list[tuple[Killable, Future[Decision]]] = []
+        running: list[tuple[KillableProcess, Future[Decision]]] = []
         try:
             for task in tasks:
                 process = self._idle.pop()

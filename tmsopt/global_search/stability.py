@@ -14,7 +14,7 @@ from tmsopt.global_search.signs import has_no_stable_design
 from tmsopt.global_search.tasks import FOUND, INFEASIBLE, SolverFailed
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import default_start
-from tmsopt.progress import Counts
+from tmsopt.progress import ReportCount
 
 SOLVER = SCIP
 """The global solver in use, here and in `certify`."""
@@ -45,7 +45,7 @@ def find_stable_design(
     problem: Posed,
     seconds: float,
     known_design: Mapping[str, float] | None = None,
-    progress: Counts | None = None,
+    progress: ReportCount | None = None,
 ) -> Stability:
     """Decide whether any design of the box has all roots left of the axis in every case listed.
 

@@ -1,7 +1,7 @@
 """Models whose roots can be designed: tms, whipple, and models of your own.
 
 In: parameters by name. Out: coefficients and quantities in any arithmetic. Open `model` first, which defines a model;
-then `bicycles`, and `built_in` for their names.
+then `bicycles`. `built_in` lists the models by name.
 """
 
 import lazy_loader

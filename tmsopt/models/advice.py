@@ -24,32 +24,37 @@ _REPAIRS: tuple[Repair, ...] = (
     (_NUMBER + rf"\s*({'|'.join(_UNITS)})\b(?!\s*/)", lambda match: f"{float(match[1]) * _UNITS[match[2]]:.12g}"),
     (_NUMBER + r"\s*(?=(?!j\b)[A-Za-z(])", r"\1*"),
 )
-"""Pattern of a foreign notation → its replacement, applied in this order."""
+"""(Pattern of another notation, its replacement), in the order in which they are applied."""
 
 _WITH_UNIT = re.compile(_NUMBER + rf"\s*({'|'.join(_UNITS)}|deg|°)(?!\w)")
 
 
 def call_advice(name: str, arguments: Iterable[str]) -> str:
-    """The end of a message about an unknown function: what to write instead; empty without advice."""
+    """The end of a message about an unknown function: what to write instead; empty if there is no advice."""
     functions = _WORDS["functions"]
     advised = f"write {functions[name]}" if name in functions else AMBIGUOUS_NAMES["t"] if "t" in arguments else ""
     return f"; {advised}" if advised else ""
 
 
-def advice(text: str, parses: Callable[[str], bool]) -> str:
-    """The end of a message about a text that does not parse: what to write instead; empty without advice.
+def advice(text: str, can_parse: Callable[[str], bool]) -> str:
+    """The end of a message about a text that does not parse: what to write instead; empty if there is no advice.
 
     Args:
-        parses: function that returns whether a text parses.
+        can_parse: function that returns whether a text parses.
     """
     if re.search(r"\d[jJ]\b", text):
         return "; expressions are real: write real and imaginary part as two numbers; only the matrix H may be complex"
-    if missing := text.count("(") - text.count(")"):
-        return f"; a {'()'[missing > 0]} is missing"
-    mended = text.strip()
+    if missing_count := text.count("(") - text.count(")"):
+        return f"; a {'()'[missing_count > 0]} is missing"
+    repaired_text = text.strip()
     for pattern, replacement in _REPAIRS:
-        mended = re.sub(pattern, replacement, mended)
-    if mended == text.strip() or not mended.isascii() or "inf" in mended or not parses(mended):
+        repaired_text = re.sub(pattern, replacement, repaired_text)
+    if (
+        repaired_text == text.strip()
+        or not repaired_text.isascii()
+        or "inf" in repaired_text
+        or not can_parse(repaired_text)
+    ):
         return ""
     units = " (numbers in expressions are in m, kg, s, rad and N)" if _WITH_UNIT.search(text) else ""
-    return f"; write '{mended}'{units}"
+    return f"; write '{repaired_text}'{units}"

@@ -1,8 +1,8 @@
-"""Parameter files of the BicycleParameters program: text with uncertainties, and YAML.
+"""Reads and writes parameter files of the BicycleParameters program: text with uncertainties, and YAML.
 
-Text files have lines such as ``rF = 0.344+/-0.0001``; several values between commas are averaged; ``#`` begins a
+Text files have lines such as ``rF = 0.344+/-0.0001``. Several values between commas are averaged, and ``#`` begins a
 comment. YAML files have the numbers under ``values:``, or at the top level. The names follow Meijaard et al. (2007):
-``lam`` is lambda_s, ``IFyy`` is I_Fyy. ``IByy`` and ``IHyy`` do not affect the linear motion.
+``lam`` is lambda_s, and ``IFyy`` is I_Fyy. ``IByy`` and ``IHyy`` do not affect the linear motion.
 """
 
 import math
@@ -18,13 +18,13 @@ from tmsopt.records import Numbers, Table
 
 _SI = whipple.sets[0]
 _FILE_NAMES = {p.name: "lam" if p.name == "lambda_s" else p.name.replace("_", "") for p in _SI.parameters}
-_MODEL_NAMES = {written: name for name, written in _FILE_NAMES.items()}
+_MODEL_NAMES = {file_name: name for name, file_name in _FILE_NAMES.items()}
 _NAMES_WITHOUT_EFFECT = ("IByy", "IHyy", "yB", "yH", "yR", "yF")
 """Names in the files on which the linear motion does not depend."""
 
 _REDUNDANT_NAMES = (
     *("IRzz", "IFzz"),  # equal to IRxx, IFxx for round wheels
-    *("d1", "d2", "d3"),  # the geometry in other parameters
+    *("d1", "d2", "d3"),  # other parameters of the same geometry
     *("xcl", "zcl"),  # point of action of a lateral force
     *(f"{symbol}{part}" for part in "GS" for symbol in ("m", "x", "z")),  # handlebar, fork
     *(f"I{part}{axes}" for part in "GS" for axes in ("xx", "yy", "zz", "xz")),
@@ -50,8 +50,8 @@ class Bicycle:
     Attributes:
         name: name of the file without its ending.
         parameters: parameters of the model ``whipple`` in SI units and radians; the speed may be missing.
-        uncertainties: standard deviations above 0.
-        others: numbers that do not affect the linear motion, by their names in the file.
+        uncertainties: parameter → standard deviation, if it is above 0.
+        others: name in the file → number that does not affect the linear motion.
 
     Example:
         >>> bicycle = tmsopt.Bicycle("mine", {"w": 1.02, "m_B": 85.0}, uncertainties={"w": 0.005})
@@ -67,7 +67,10 @@ class Bicycle:
     others: Table[float] = Table()
 
     def tolerances(self, deviations: float = 2.0, most: int = 8) -> dict[str, float]:
-        """Tolerances of `deviations` standard deviations for the `most` parameters of largest relative deviation."""
+        """Tolerances of `deviations` standard deviations.
+
+        Only the `most` parameters with the largest relative deviations have one.
+        """
         relative_deviations = {n: u / (abs(self.parameters[n]) or math.inf) for n, u in self.uncertainties.items()}
         names = sorted(relative_deviations, key=lambda n: -relative_deviations[n])[:most]
         return {n: deviations * self.uncertainties[n] for n in self.parameters if n in names}
@@ -77,7 +80,7 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     """Read a parameter file of BicycleParameters, such as ``BrowserBenchmark.txt`` or ``benchmark-browser.yml``.
 
     Raises:
-        InputError: with every line that is not readable and every unknown or missing name.
+        InputError: if a line cannot be read, or a name is unknown or missing. The error lists all of these faults.
 
     Example:
         >>> from tempfile import TemporaryDirectory
@@ -92,27 +95,27 @@ def read_bicycle(path: str | PathLike[str]) -> Bicycle:
     file = as_path(path, "a file of bicycle parameters")
     kind = "YAML" if file.suffix.lower() in _YAML_SUFFIXES else "TXT"
     text = read_text(str(path), f"{kind} file of bicycle parameters")
-    entries = list(_entries(text, kind == "YAML"))
+    entries = list(_read_entries(text, kind == "YAML"))
     faults, parameters, deviations, other_numbers = [], {}, {}, {}
     advice = limit_advice(suggest)
-    for number, name, written in entries:
-        numbers, message = _numbers(written), ""
+    for line_number, name, value_text in entries:
+        numbers, message = _parse_numbers(value_text), ""
         if kind == "YAML" and name == "parameterization":
-            if written.strip("'\" ").lower() not in _PARAMETERIZATIONS:
-                message = f"found the parameterization {short(written)}; accepted: Meijaard2007 or benchmark"
+            if value_text.strip("'\" ").lower() not in _PARAMETERIZATIONS:
+                message = f"found the parameterization {short(value_text)}; accepted: Meijaard2007 or benchmark"
         elif name not in _MODEL_NAMES and name not in _UNUSED_NAMES:
             message = f"unknown name {short(name)}; {advice(name, [*_MODEL_NAMES, *_NAMES_WITHOUT_EFFECT])}"
         elif numbers is None:
             message = (
-                f"{name}: found {short(written)}; "
+                f"{name}: found {short(value_text)}; "
                 "accepted: a number, with +/- its uncertainty, or several between commas"
             )
         elif name in _UNUSED_NAMES:
-            other_numbers[name] = numbers[0]
+            other_numbers[name], _ = numbers
         else:
             parameters[_MODEL_NAMES[name]], deviations[_MODEL_NAMES[name]] = numbers
         if message:
-            faults.append(Fault(message).at(str(path), number))
+            faults.append(Fault(message).at(str(path), line_number))
     names_in_file = {name for _, name, _ in entries}
     if missing := [w for n, w in _FILE_NAMES.items() if w not in names_in_file and n not in _OPTIONAL_NAMES]:
         hint = "These are raw measurements; make the Benchmark file with BicycleParameters."
@@ -138,10 +141,10 @@ def write_bicycle(bicycle: Bicycle | Numbers, path: str | PathLike[str]) -> None
     """Write a bicycle, or the parameters of a ``whipple`` design, as a BicycleParameters file.
 
     The ending of the name selects the format: ``.txt`` and ``.ini`` text, ``.yml`` and ``.yaml`` YAML, which has no
-    uncertainties. Every number reads back the same.
+    uncertainties. Reading the file gives the same numbers.
 
     Raises:
-        InputError: if the ending is another, or parameters are missing.
+        InputError: if the name has another ending, or parameters are missing.
         OSError: if the file cannot be written.
 
     Example:
@@ -166,13 +169,13 @@ def write_bicycle(bicycle: Bicycle | Numbers, path: str | PathLike[str]) -> None
         raise InputError([Fault(f"missing parameter {', '.join(missing)}", ("parameters",))])
     numbers = {w: values[n] for n, w in _FILE_NAMES.items() if n in values}
     numbers |= {n: float(record.others.get(n, 0.0)) for n in ("IByy", "IHyy")}
-    deviations = {_FILE_NAMES[n]: f"+/-{_decimal(u)}" for n, u in record.uncertainties.items() if u}
+    deviations = {_FILE_NAMES[n]: f"+/-{_format_decimal(u)}" for n, u in record.uncertainties.items() if u}
     if suffix in _TEXT_SUFFIXES:
-        lines = [f"{n} = {_decimal(x)}{deviations.get(n, '')}" for n, x in sorted(numbers.items())]
+        lines = [f"{n} = {_format_decimal(x)}{deviations.get(n, '')}" for n, x in sorted(numbers.items())]
     else:
         name = _quote(record.name)
         head = ["parameterization: Meijaard2007", f"parameters: {name}", "rider: null", "description: ''"]
-        lines = [*head, "values:", *(f"  {n}: {_decimal(x)}" for n, x in sorted(numbers.items()))]
+        lines = [*head, "values:", *(f"  {n}: {_format_decimal(x)}" for n, x in sorted(numbers.items()))]
     write_text(file, "\n".join(lines) + "\n")
 
 
@@ -192,29 +195,29 @@ def problem_text(bicycle: Bicycle, speed: float | None = None) -> str:
     lines = [f"title = {_quote(bicycle.name)}", 'model = "whipple"', "", "[parameters]"]
     for p in _SI.parameters:
         deviation = f"; ± {bicycle.uncertainties[p.name]:.6g}" if p.name in bicycle.uncertainties else ""
-        number = _decimal(float(values.get(p.name, p.default) or 0.0))
-        lines.append(f"{p.name} = {number}  # {p.meaning}, {p.unit}{deviation}")
+        number_text = _format_decimal(float(values.get(p.name, p.default) or 0.0))
+        lines.append(f"{p.name} = {number_text}  # {p.meaning}, {p.unit}{deviation}")
     return "\n".join(lines) + "\n"
 
 
-def _entries(text: str, in_yaml: bool) -> Iterator[tuple[int, str, str]]:
+def _read_entries(text: str, in_yaml: bool) -> Iterator[tuple[int, str, str]]:
     """Line number, name and value of each entry. YAML files have the entries under ``values:``, or at the top level."""
-    nested, section = in_yaml and re.search(r"^values\s*:", text, re.MULTILINE), ""
-    for number, line in enumerate(text.splitlines(), start=1):
+    has_values_section, section = in_yaml and re.search(r"^values\s*:", text, re.MULTILINE), ""
+    for line_number, line in enumerate(text.splitlines(), start=1):
         content = re.split(r"(?:^|\s)#" if in_yaml else "#", line, maxsplit=1)[0].rstrip()
-        name, _, written = (part.strip() for part in content.partition(":" if in_yaml else "="))
+        name, _, value_text = (part.strip() for part in content.partition(":" if in_yaml else "="))
         if in_yaml and content[:1].isspace():
             is_entry = section == "values"
         elif content:
-            section, is_entry = name, not nested or name == "parameterization"
+            section, is_entry = name, not has_values_section or name == "parameterization"
         if content.strip() and is_entry:
-            yield number, name, written
+            yield line_number, name, value_text
 
 
-def _numbers(written: str) -> tuple[float, float] | None:
+def _parse_numbers(value_text: str) -> tuple[float, float] | None:
     """The mean of the values and the standard deviation of the mean; None if a value is not a number."""
     values, deviations = [], []
-    for part in written.split(","):
+    for part in value_text.split(","):
         if (match := _MEASURED.fullmatch(part.strip())) is None:
             return None
         power = match["power"] or ""
@@ -225,8 +228,8 @@ def _numbers(written: str) -> tuple[float, float] | None:
     return sum(values) / len(values), math.hypot(*deviations) / len(values)
 
 
-def _decimal(value: float) -> str:
-    """The shortest decimal that reads back the same, with a point, which YAML requires in a float."""
+def _format_decimal(value: float) -> str:
+    """The shortest decimal of a double, with a point, because YAML requires a point in a float."""
     text = repr(float(value))
     return text.replace("e", ".0e") if "e" in text and "." not in text else text
 

@@ -1,4 +1,4 @@
-"""Exact values of the numbers of a problem."""
+"""Exact values of the numbers of a problem: fractions, and irrational constants such as sqrt(2)."""
 
 import math
 import re
@@ -18,11 +18,11 @@ from tmsopt.models.expression import parse_value
 from tmsopt.models.model import Model, ParameterSet
 from tmsopt.records import AnyNumbers, Numbers, Table
 
-SAME = 4e-15
-"""Greatest accepted relative difference between an exact value and the double of the design: a few rounding errors."""
+MAX_DIFFERENCE = 4e-15
+"""Largest accepted relative difference between an exact value and the double of the design: a few rounding errors."""
 
-MOST_DIGITS = 400
-"""Greatest number of digits of an exact number; doubles have up to 309 digits before the point."""
+MAX_DIGITS = 400
+"""Largest number of digits of an exact number. A double has up to 309 digits before the point."""
 
 _POWER_OF_TEN = re.compile(r"[eE]([+-]?[\d_]+)")
 _DEGREES = re.compile(r"(.*?)\s*(?:deg|°)")
@@ -51,7 +51,7 @@ class Exact:
         return self.node.fraction
 
     def ball(self) -> Any:
-        """The number as a ball (an interval with midpoint and radius) of the working precision, angles in radians."""
+        """The number as a ball (a midpoint with a radius) of the working precision; an angle is in radians."""
         return flint.arb(fold(formula([self.node]), {}, BALLS)[0])
 
     def times(self, factor: Fraction) -> "Exact":
@@ -61,7 +61,7 @@ class Exact:
         return self if factor == 1 else Exact(self.node * factor, f"({self.text})*{factor}")
 
     def to_radians(self) -> "Exact":
-        """The angle in radians, if the number is an angle in degrees."""
+        """The same angle in radians; the number must be an angle in degrees."""
         return Exact(self.node * PI / 180, f"{self.text} deg") if self.fraction != 0 else self
 
     def __float__(self) -> float:
@@ -79,27 +79,27 @@ def constant(text: str) -> Exact:
     """The constant of a text such as ``8/3``, ``-0.1`` or ``2*pi/3``.
 
     Raises:
-        ValueError: if the text is not a constant, has no value or is beyond double precision.
+        ValueError: if the text is not a constant, has no value, or is too large or too small for double precision.
     """
     try:
-        exact = Exact.from_fraction(decimal(text))
+        exact_number = Exact.from_fraction(decimal(text))
     except (ValueError, ZeroDivisionError):
         expression = parse_value(text, (), "8/3")
-        exact = Exact(fold(expression.formula, {}, NODES)[0], expression.text)
+        exact_number = Exact(fold(expression.formula, {}, NODES)[0], expression.text)
         with flint.ctx.workdps(DIGITS):
             value = fold(expression.formula, {}, BALLS)[0]
         if isinstance(value, flint.fmpq):
-            exact = Exact.from_fraction(Fraction(int(value.p), int(value.q)))
+            exact_number = Exact.from_fraction(Fraction(int(value.p), int(value.q)))
         elif not value.is_finite():
             raise ValueError(f"'{text}' has no value") from None
-    if not math.isfinite(float(exact)) or (float(exact) == 0 and exact.fraction):
+    if not math.isfinite(float(exact_number)) or (float(exact_number) == 0 and exact_number.fraction):
         raise ValueError(f"'{text}' is a number beyond double precision")
-    return exact
+    return exact_number
 
 
 def number(x: float, text: str = "") -> Node:
     """A double as a node of a formula: the exact number in `text`, or without a text its shortest decimal."""
-    typed = _parse(text, angle=True) if text else None
+    typed = _parse_exact(text, is_angle=True) if text else None
     return typed.node if typed else node_of(float(x))
 
 
@@ -116,8 +116,8 @@ def decimal(x: Any) -> Fraction:
     More: docs/explanation/proofs.md
     """
     if isinstance(x, str):
-        power = _POWER_OF_TEN.search(x[:MOST_DIGITS])
-        if len(x) > MOST_DIGITS or (power and abs(int(power[1])) > MOST_DIGITS):  # before a slow conversion
+        power = _POWER_OF_TEN.search(x[:MAX_DIGITS])
+        if len(x) > MAX_DIGITS or (power and abs(int(power[1])) > MAX_DIGITS):  # checked before the slow conversion
             raise ValueError("too many digits")
     fraction = Fraction(repr(float(x))) if isinstance(x, float) else Fraction(x)
     if _is_long(fraction):
@@ -134,7 +134,7 @@ def _double(x: Fraction) -> float:
 
 
 def _is_long(x: Any) -> bool:
-    return isinstance(x, int | Fraction) and max(abs(x.numerator), x.denominator) >= 10**MOST_DIGITS
+    return isinstance(x, int | Fraction) and max(abs(x.numerator), x.denominator) >= 10**MAX_DIGITS
 
 
 @dataclass(frozen=True)
@@ -142,14 +142,14 @@ class ExactDesign:
     """A design in exact numbers.
 
     Attributes:
-        values: every parameter except those in `tangents`.
-        tangents: angle → its tangent, where the tangent was given exactly.
-        stated: names given exactly, a parameter or ``tan(parameter)``.
+        values: parameter → its value, except for the parameters in `tangents`.
+        tangents: angle → its tangent, if the tangent was given exactly.
+        given_exactly: names that were given exactly, a parameter or ``tan(parameter)``.
     """
 
     values: Table[Exact]
     tangents: Table[Exact]
-    stated: tuple[str, ...] = ()
+    given_exactly: tuple[str, ...] = ()
 
     def balls(self) -> dict[str, Any]:
         """Parameter → ball, angles in radians."""
@@ -180,11 +180,11 @@ class ExactDesign:
             return None
         try:
             return [[[rational(x) for x in row] for row in P] for P in model.pencil(parameter_set.native(numbers))]
-        except (TypeError, ValueError, AttributeError):  # matrices with more of an angle than its tangent
+        except (TypeError, ValueError, AttributeError):  # the matrices use other functions of an angle than its tangent
             return None
 
     def text(self, name: str) -> tuple[str, str]:
-        """The name of an exact number, which may be ``tan(name)``, and its text."""
+        """Two texts: the name of the number that is exact, which may be ``tan(name)``, and the number."""
         if name in self.tangents:
             return f"tan({name})", str(self.tangents[name])
         return name, str(self.values[name])
@@ -200,8 +200,8 @@ def as_exact_design(
 
     Args:
         exact_numbers: parameter, or ``tan(parameter)`` of an angle → its exact value: an int, a Fraction, an fmpq, a
-            float, which stands for its decimal, or a text such as ``"-2/5"``, ``"sqrt(2)/2"`` or ``"20 deg"``.
-        typed: parameter → its exact value as a text of the problem, as in `Problem.typed`.
+            float, which means its shortest decimal, or a text such as ``"-2/5"``, ``"sqrt(2)/2"`` or ``"20 deg"``.
+        typed: parameter → its exact value as a text of the problem, as in `Posed.typed`.
 
     Raises:
         InputError: if a name is unknown, a value is not exact, or it differs from the double of the design.
@@ -212,24 +212,28 @@ def as_exact_design(
         f"tan({p.name})": p.name for p in parameter_set.parameters if p.tangent
     }
     values = {n: Exact.from_fraction(decimal(float(parameters[n]))) for n in parameter_set.names}
-    values |= {n: number for n, text in typed.items() if (number := _parse(text, angle=parameter_set[n].unit == "rad"))}
+    values |= {
+        n: number
+        for n, text in typed.items()
+        if (number := _parse_exact(text, is_angle=parameter_set[n].unit == "rad"))
+    }
     tangents: dict[str, Exact] = {}
     faults = []
     for key, entry in (exact_numbers or {}).items():
         name = names.get(key)
-        angle = key == name and parameter_set[key].unit == "rad"
+        is_angle = key == name and parameter_set[key].unit == "rad"
         if name is None:
             message = f"unknown parameter '{key}'; {suggest(key, names)}"
-        elif (number := _parse(entry, angle)) is None:
+        elif (number := _parse_exact(entry, is_angle)) is None:
             description = "a number of more digits" if _is_long(entry) else short(entry)
             message = (
                 f"found {description}; accepted: an int, a Fraction, a constant in quotes such as '-2/5' or 'sqrt(2)'"
-                f"{', or an angle such as ' + repr('20 deg') if angle else ''}, of up to {MOST_DIGITS} digits"
+                f"{', or an angle such as ' + repr('20 deg') if is_angle else ''}, of up to {MAX_DIGITS} digits"
             )
         else:
             (values if key == name else tangents)[name] = number
             stored = float(parameters[name]) if key == name else math.tan(parameters[name])
-            if math.isclose(float(number.ball()), stored, rel_tol=SAME, abs_tol=1e-300):
+            if math.isclose(float(number.ball()), stored, rel_tol=MAX_DIFFERENCE, abs_tol=1e-300):
                 continue
             message = f"found {number}, but the design has {stored!r}; give the exact form of the same number"
         faults.append(Fault(message, ("exact", key)))
@@ -239,12 +243,12 @@ def as_exact_design(
     return ExactDesign(other_values, Table(tangents), tuple(exact_numbers or ()))
 
 
-def _parse(value: Any, angle: bool) -> Exact | None:
+def _parse_exact(value: Any, is_angle: bool) -> Exact | None:
     if isinstance(value, bool):
         return None
     try:
         if isinstance(value, str):
-            degrees = _DEGREES.fullmatch(value.strip()) if angle else None
+            degrees = _DEGREES.fullmatch(value.strip()) if is_angle else None
             return constant(degrees[1]).to_radians() if degrees else constant(value)
         if isinstance(value, flint.fmpq | flint.fmpz):
             fraction = rational(value) if isinstance(value, flint.fmpq) else flint.fmpq(value)

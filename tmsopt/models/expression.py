@@ -33,11 +33,11 @@ _ALLOWED_RANGES = {"<=": (-math.inf, 0.0), ">=": (0.0, math.inf), "==": (0.0, 0.
 SIGN = re.compile("|".join(COMPARISONS.values()))
 """Matches a comparison sign."""
 
-_LONGEST = 2000  # most characters of an expression; a longer text could exhaust the stack of the parser
-_DEEPEST = 200  # most nested levels of an expression
-_MAX_QUOTED = 60  # most characters of a quoted part in a message
+_MAX_LENGTH = 2000  # largest number of characters of an expression; a longer text could exhaust the parser's stack
+_MAX_DEPTH = 200  # largest number of nested levels of an expression
+_MAX_QUOTED = 60  # largest number of characters of a quoted part in a message
 _LANGUAGE = f"numbers, names, + - * / **, parentheses and {' '.join(FUNCTIONS)}"
-_BAD_CHARACTER = re.compile(r"[^ -~]|#")  # look-alike letters, line breaks and comments
+_BAD_CHARACTER = re.compile(r"[^ -~]|#")  # letters that look like ASCII letters, line breaks, and comments
 
 
 class ExpressionError(ValueError):
@@ -92,13 +92,15 @@ class Expression:
         return left - right[0] if right else left
 
     def sides(self, values: AnyNumbers) -> tuple[Any, ...]:
-        """Both sides of a comparison, or the one value."""
+        """(Left side, right side) of a comparison, or (value,)."""
         return tuple(float(x) if isinstance(x, np.float64) else x for x in kinds.values(self.formula, values))
 
     def difference(self, values: AnyNumbers, limit: Any) -> Any:
         """Left minus right, where `limit` replaces a side that is a constant."""
-        numbers = [self.formula.steps[k].op == CONSTANT for k in self.formula.outputs]
-        left, right = (limit if is_number else x for x, is_number in zip(self.sides(values), numbers, strict=True))
+        are_constant = [self.formula.steps[k].op == CONSTANT for k in self.formula.outputs]
+        left, right = (
+            limit if is_constant else x for x, is_constant in zip(self.sides(values), are_constant, strict=True)
+        )
         return left - right
 
     def of(self, values: AnyNumbers, kind: Kind) -> Any:
@@ -107,7 +109,7 @@ class Expression:
         return kind.operations["sub"](left, right[0]) if right else left
 
     def violation(self, values: AnyNumbers) -> float:
-        """Violation of a comparison at a numeric design, relative to the size of its sides; nan if undefined."""
+        """Violation of a comparison by a numeric design, relative to the size of the sides; nan if it is not finite."""
         left, right = self.sides(values)
         excess = float(self.excess(left - right))
         return excess / max(1.0, abs(left), abs(right)) if math.isfinite(left - right) else math.nan
@@ -119,7 +121,7 @@ class Expression:
 
     @property
     def allowed(self) -> tuple[float, float]:
-        """Least and greatest left minus right that the comparison allows."""
+        """(Least, greatest) value of left minus right that the comparison allows."""
         return _ALLOWED_RANGES[self.comparison]
 
     @property
@@ -140,7 +142,7 @@ def parse_value(text: str, accepted: Iterable[str] | None, example: str = "absci
     """Parse an expression for a value, such as an objective; any name is accepted if `accepted` is None.
 
     Raises:
-        ExpressionError: naming the part found and what is accepted.
+        ExpressionError: if the text is no such expression. The message names the part found and the accepted parts.
 
     Example:
         >>> tmsopt.models.parse_value("x_H - x_B", None).names
@@ -148,16 +150,16 @@ def parse_value(text: str, accepted: Iterable[str] | None, example: str = "absci
 
     More: docs/reference/problem_file.md
     """
-    if isinstance(_parse(_text(text)), ast.Compare):
+    if isinstance(_parse(_check_text(text)), ast.Compare):
         raise ExpressionError(f"{_quote(text)} is a comparison; accepted: a value, such as '{example}'")
-    return _check_names(_value(text), accepted)
+    return _check_names(_parse_value_text(text), accepted)
 
 
 def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
     """Parse a constraint: two values joined by one of ``<= >= ==``.
 
     Raises:
-        ExpressionError: naming the part found and what is accepted.
+        ExpressionError: if the text is no such constraint. The message names the part found and the accepted parts.
 
     Example:
         >>> tmsopt.models.parse_comparison("mu <= 2", ["mu"])({"mu": 6.0})  # left minus right
@@ -165,11 +167,11 @@ def parse_comparison(text: str, accepted: Iterable[str]) -> Expression:
 
     More: docs/reference/problem_file.md
     """
-    return _check_names(_comparison(_text(text)), accepted)
+    return _check_names(_parse_comparison_text(_check_text(text)), accepted)
 
 
 def _check_names(expression: Expression, accepted: Iterable[str] | None) -> Expression:
-    """Check the names of an expression and return it. The cached parser does not check them, because they differ."""
+    """Check the names of an expression and return it. The cached parser cannot: accepted names differ between calls."""
     accepted_names = expression.names if accepted is None else tuple(accepted)
     for name in expression.names:
         if name not in accepted_names:
@@ -178,18 +180,18 @@ def _check_names(expression: Expression, accepted: Iterable[str] | None) -> Expr
 
 
 @lru_cache(maxsize=4096)
-def _value(text: str) -> Expression:
+def _parse_value_text(text: str) -> Expression:
     names, value = _parse_tree(_parse(text), text)
     return Expression(text, names, formula=formula([value], names))
 
 
 @lru_cache(maxsize=4096)
-def _comparison(text: str) -> Expression:
+def _parse_comparison_text(text: str) -> Expression:
     body = _parse(text)
     if not isinstance(body, ast.Compare):
         raise ExpressionError(f"{_quote(text)} is not a comparison; write e.g. 'nu_H >= 0.02' with <=, >= or ==")
     if len(body.ops) > 1:
-        texts = pairwise(_source(side, text) for side in (body.left, *body.comparators))
+        texts = pairwise(_source_text(side, text) for side in (body.left, *body.comparators))
         signs = ({**COMPARISONS, **_STRICT_SIGNS}.get(type(op), "==") for op in body.ops)
         parts = " and ".join(f"'{a} {sign} {b}'" for (a, b), sign in zip(texts, signs, strict=True))
         raise ExpressionError(f"{_quote(text)} joins several comparisons; write one constraint for each, {parts}")
@@ -209,12 +211,12 @@ def written_sides(text: str) -> tuple[str, str, str]:
     Raises:
         ExpressionError: if the text is not one comparison.
     """
-    sign, body = _comparison(text).comparison, _parse(text)
+    sign, body = _parse_comparison_text(text).comparison, _parse(text)
     assert isinstance(body, ast.Compare)
-    return _source(body.left, text), sign, _source(body.comparators[0], text)
+    return _source_text(body.left, text), sign, _source_text(body.comparators[0], text)
 
 
-def _text(value: object) -> str:
+def _check_text(value: object) -> str:
     if not isinstance(value, str):
         raise ExpressionError(f"found {short(value)}; accepted: an expression in quotes")
     return value
@@ -226,13 +228,13 @@ _PARSER_LOCK = threading.Lock()
 
 @lru_cache(maxsize=4096)
 def _parse(text: str) -> ast.expr:
-    if len(text) > _LONGEST:
-        raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_LONGEST}")
+    if len(text) > _MAX_LENGTH:
+        raise ExpressionError(f"expression of {len(text)} characters; accepted: up to {_MAX_LENGTH}")
     if bad_character := _BAD_CHARACTER.search(text.strip()):
         message = f"{_quote(text)} contains {bad_character[0]!r}{_advice(text)}"
         raise ExpressionError(f"{message}; accepted: one line of {_LANGUAGE}")
     try:
-        return _tree(text)
+        return _parse_syntax(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         column = f" at character {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
         reserved = next((word for word in re.findall(r"[A-Za-z_]\w*", text) if keyword.iskeyword(word)), None)
@@ -243,22 +245,22 @@ def _parse(text: str) -> ast.expr:
         raise ExpressionError(f"{_quote(text)} {message}") from None
 
 
-def _tree(text: str) -> ast.expr:
+def _parse_syntax(text: str) -> ast.expr:
     with _PARSER_LOCK, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the tokenizer warns of texts like 1if, which then fail
         return ast.parse(text.strip(), mode="eval").body
 
 
 def _advice(text: str) -> str:
-    """The end of a message: what to write instead."""
+    """The end of a message about a text: what to write instead; empty if there is no advice."""
 
-    def parses(mended: str) -> bool:
+    def can_parse(repaired_text: str) -> bool:
         try:
-            return not isinstance(_tree(mended), ast.Tuple)
+            return not isinstance(_parse_syntax(repaired_text), ast.Tuple)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             return False
 
-    return advice(text, parses)
+    return advice(text, can_parse)
 
 
 class _Part(NamedTuple):
@@ -279,7 +281,7 @@ def _parse_tree(body: ast.expr, text: str) -> tuple[tuple[str, ...], Node]:
         node = parser.parse(body).node
         return tuple(parser.names), node
     except DegreeTooHigh as error:
-        part = _source(error.part, text)
+        part = _source_text(error.part, text)
         prefix = "" if part == text.strip() else f"{_quote(text)}: "
         raise ExpressionError(f"{prefix}{_quote(part)} {error}") from None
 
@@ -298,8 +300,8 @@ class _Parser:
     def parse(self, node: ast.expr, depth: int = 0) -> _Part:  # noqa: PLR0911, PLR0912 - one case per kind
         """The node of a part; raises `ExpressionError` if the part is not accepted."""
         text = self.text
-        if depth > _DEEPEST:
-            raise ExpressionError(f"'{text[:60]}…' is nested deeper than {_DEEPEST} levels")
+        if depth > _MAX_DEPTH:
+            raise ExpressionError(f"'{text[:60]}…' is nested deeper than {_MAX_DEPTH} levels")
 
         match node:
             case ast.Constant(value=bool()):
@@ -326,38 +328,48 @@ class _Parser:
                     accepted = (
                         f"{min_count} to {max_count} arguments, {name}(a, b)" if max_count > 1 else "one argument"
                     )
-                    hint = f"; for one number write {_source(args[0], text)} alone" if 0 < len(args) < min_count else ""
+                    hint = (
+                        f"; for one number write {_source_text(args[0], text)} alone"
+                        if 0 < len(args) < min_count
+                        else ""
+                    )
                     message = f"calls {name} with {len(args)} arguments; accepted: {accepted}{hint}"
                     raise ExpressionError(f"{_quote(text)} {message}")
                 return self.apply(name, node, args, depth)
             case ast.Call():
-                hint = call_advice(function := _source(node.func, text), [_source(a, text) for a in node.args])
+                hint = call_advice(
+                    function := _source_text(node.func, text), [_source_text(a, text) for a in node.args]
+                )
                 raise ExpressionError(f"{_quote(text)} calls '{function}'{hint}; accepted: {' '.join(FUNCTIONS)}")
             case ast.Attribute():
-                message = f"uses the attribute '{_source(node, text)}'; accepted: plain names"
+                message = f"uses the attribute '{_source_text(node, text)}'; accepted: plain names"
                 raise ExpressionError(f"{_quote(text)} {message}")
             case _:
-                message = f"contains '{_source(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}"
+                message = f"contains '{_source_text(node, text)}'{_advice(text)}; accepted: {_LANGUAGE}"
                 raise ExpressionError(f"{_quote(text)} {message}")
 
-    def apply(self, op: str, whole: ast.expr, operands: Sequence[ast.expr], depth: int) -> _Part:
-        """Apply an operation to its operands; more than two operands are combined one after the other."""
+    def apply(self, op: str, operation: ast.expr, operands: Sequence[ast.expr], depth: int) -> _Part:
+        """Apply an operation to its operands; more than two operands are combined from left to right.
+
+        Args:
+            operation: the part of the syntax tree with this operation, for messages.
+        """
         parts = [self.parse(operand, depth + 1) for operand in operands]
         try:
             return reduce(partial(_combine, op), parts[1:], parts[0]) if parts[1:] else _combine(op, *parts)
         except DegreeTooHigh as error:
-            error.part = error.part or whole
+            error.part = error.part or operation
             raise
 
 
-def _source(node: ast.expr, text: str) -> str:
+def _source_text(node: ast.expr, text: str) -> str:
     """The text from which a node was parsed."""
     return ast.get_source_segment(text.strip(), node) or text
 
 
 def _read_number(node: ast.Constant, text: str) -> Fraction:
     """The exact value of a number in the text. 0e999999 is 0: the power of ten is not computed."""
-    value, source = node.value, _source(node, text)
+    value, source = node.value, _source_text(node, text)
     try:
         number = float(value)  # type: ignore[arg-type]
     except OverflowError:

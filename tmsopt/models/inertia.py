@@ -19,18 +19,19 @@ _BITS = 400  # precision of tan λ_s and 1/cos λ_s, the only irrational numbers
 
 
 def inertia_margin(parameters: Numbers) -> Table[float | None] | None:
-    """For each moment of inertia, the least value in kg m² at which, with the others 0, a design is no longer stable.
+    """For each moment of inertia, the least value in kg m² at which a design is no longer stable if the others are 0.
 
-    Whipple's equations without wheels, trail and inertia are those of two masses on skates. Their coefficients are
-    polynomials in one moment of inertia. Stability is lost at the least positive root of a0 aₙ Δₙ₋₁, with Δ the Hurwitz
-    determinants: a root at infinity, a root 0, or a pair on the imaginary axis. The computation is exact for the stored
-    doubles.
+    Whipple's equations without wheels, trail and inertia are the equations of two masses on skates. Their coefficients
+    are polynomials in one moment of inertia. Stability is lost at the least positive root of a0 aₙ Δₙ₋₁ with the
+    Hurwitz determinant Δₙ₋₁. There a root of the design is infinite or 0, or a pair is on the imaginary axis. The
+    computation is exact for parameters in double precision.
 
     Args:
         parameters: parameters of the model ``tms`` in SI, with the gains of a controller if it has one.
 
     Returns:
-        Name → value, or None if the design stays stable for every value; None instead of a table if it is not stable.
+        Name → value, or None if the design stays stable for every value. If the design itself is not stable, the result
+        is None.
 
     Example:
         >>> own = dict(w=1, v=6.9, g=9.81, lambda_s=0.4, m_B=10, x_B=1.4, z_B=-0.4, m_H=1, x_H=1, z_H=-0.2)

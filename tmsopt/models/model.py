@@ -17,19 +17,19 @@ from tmsopt.algebra.formula import Formula, fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS, kind_of
 from tmsopt.records import AnyNumbers, Numbers, Table
 
-_BALL_BITS = 106  # precision of intervals, so high that only the rounding of the parameters gives them a width
+_BALL_BITS = 106  # precision of balls; it is so high that their radius comes only from the rounding of the parameters
 _EPSILON = 2.0**-53
 _NEGLIGIBLE = 1e-9  # a parameter below this share of its range counts as 0
-_MAX_LATEX = 3000  # a longer formula in LaTeX (in characters) is not shown
+_MAX_LATEX = 3000  # a formula whose LaTeX has more characters is not shown
 
 NumberFunction = Callable[[AnyNumbers], Any]
-"""Function of named numbers that uses ``+ - * /`` and the operations of `tmsopt.algebra.kinds`, so it can be traced."""
+"""Function of named numbers. It uses ``+ - * /`` and the operations of `tmsopt.algebra.kinds`, so it can be traced."""
 
 Matrix = list[list[Any]]
 """Rows of numbers of any kind."""
 
 Matrices = tuple[Matrix, ...]
-"""Matrices of a matrix polynomial, in descending powers."""
+"""Matrices of a matrix polynomial, for descending powers."""
 
 ROOTS = ("abscissa", "damping_ratio", "angular_frequency")
 """Quantities of the roots that formulas may use."""
@@ -43,14 +43,14 @@ class Feedback:
         mass: the matrix M.
         gains: G of the torques −G (φ, δ, φ̇, δ̇), rows for lean and steer.
         lag: time constant of the actuators; None for torques without delay. With a lag the torque of each row in
-            `driven` is an additional state.
-        driven: rows with a torque: 0 for lean, 1 for steer.
+            `driven_rows` is an additional state.
+        driven_rows: rows with a torque: 0 for lean, 1 for steer.
     """
 
     mass: Matrix
     gains: Matrix
     lag: Any = None
-    driven: tuple[int, ...] = (1,)
+    driven_rows: tuple[int, ...] = (1,)
 
 
 @dataclass(frozen=True)
@@ -85,13 +85,14 @@ class Parameter:
 
     Attributes:
         name: symbol as written in files, e.g. ``chi_B``.
-        unit: SI unit, ``1`` when dimensionless.
-        meaning: one phrase.
+        unit: SI unit; ``1`` if the parameter is dimensionless.
+        meaning: description in one phrase.
         latex: symbol for figures.
         range: physically possible values.
         default: value if the parameter is omitted; None if it is required.
         tangent: for an angle, whether the coefficients are polynomials in its tangent; an optimiser varies the tangent.
-        multiple_of: for a dimensionless multiple, such as of the wheelbase, the unit of what is multiplied: ``m``.
+        multiple_of: for a parameter that is a multiple of another number, such as the wheelbase: the unit of that
+            number, ``m``.
         sides: names of the designs with a negative and a positive value, if these are searched separately.
         counterpart: for a parameter in SI, the name of its dimensionless parameter, if that name differs.
 
@@ -115,7 +116,7 @@ class Parameter:
     counterpart: str = ""
 
     def may_change(self, value: float) -> bool:
-        """True if the built value may differ: not for constants of nature and for parts that a design does not have."""
+        """True if the built value can differ. Constants of nature, and parts that a design does not have, cannot."""
         return self.default is None or (self.default == 0 and value != 0)
 
 
@@ -130,9 +131,9 @@ class Quantity:
         pieces: terms whose maximum is the quantity. An optimiser replaces the quantity by a variable that is greater
             than every term, if a greater quantity is never an advantage.
         counterpart: for a dimensionless quantity, the same quantity in SI.
-        aside: whether reports state it in a sentence instead of in their table.
-        share: whether it is a fraction of a whole, shown in percent.
-        stands_for: the expression, in root quantities and parameters, that the name abbreviates.
+        aside: whether reports state the quantity in a sentence and not in their table.
+        share: whether the quantity is a fraction of a whole, which is shown in percent.
+        stands_for: the expression of root quantities and parameters for which the name is an abbreviation.
 
     Example:
         >>> import math
@@ -237,7 +238,7 @@ class Model:
         polynomial: algebraic parameters → coefficients, descending, computed with ``+ - *`` only.
         quantities: derived quantities, besides the coefficients ``a0 …``.
         compact: like `polynomial`, but the coefficients are divided by a positive number and computed in few
-            operations with shared terms, which gives tighter bounds in interval arithmetic.
+            operations with common terms, which gives tighter bounds in interval arithmetic.
         pencil: native parameters → matrices of the matrix polynomial with these roots, in descending powers: M, D, K
             of M s² + D s + K, or I, −A.
         feedback: native parameters → the torques of a controller, which the pencil already includes.
@@ -245,13 +246,17 @@ class Model:
         origin: a function and its arguments, plain data, that make this model in another process.
         statement: plain data that identify a model of the user's own.
         numbers: for a model of the user's own, the texts of its numbers that are not integers.
-        words: the usual names of ``weave`` (a pair on the imaginary axis) and ``capsize`` (a root 0) in its field.
-        omits, conventions, sketch: texts on the effects that the model neglects and on its signs; a text drawing.
+        words: the usual names of ``weave`` (a pair on the imaginary axis) and ``capsize`` (a root 0) in the field of
+            the model.
+        omits: text about the effects that the model neglects.
+        conventions: texts about the signs.
+        sketch: drawing as text.
         absent: unknown names that a user may try → what to write instead.
-        carrier: number added to each eigenfrequency of a complex H; None for a real system. Its real polynomial has
-            twice the degree; with the carrier no root of it coincides with the conjugate of another root.
+        carrier: number added to each eigenfrequency of a complex H; None for a real system. The real polynomial of H
+            has twice the degree. Because of the carrier, none of its roots coincides with the conjugate of another.
         carried: for a complex H, ranges of the native parameters → the model with a carrier for these ranges.
-        double: for a complex H, the pencil without carrier: I and −A of (Re ψ, Im ψ)′ = A (Re ψ, Im ψ).
+        double: for a complex H, the pencil of the real system of twice the size without carrier: I and −A of
+            (Re ψ, Im ψ)′ = A (Re ψ, Im ψ).
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -354,7 +359,7 @@ class Model:
 
 
 def words_of(model: Model) -> Mapping[str, str]:
-    """``weave`` and ``capsize`` → the words for them in the field of a model.
+    """``weave`` and ``capsize`` → their names in the field of a model.
 
     Example:
         >>> dict(tmsopt.models.words_of(tmsopt.models.from_coefficients([1, "c", "k"])))
@@ -366,7 +371,7 @@ def words_of(model: Model) -> Mapping[str, str]:
 
 
 def in_words_of(model: Model, text: str) -> str:
-    """A text such as ``infinity and weave`` with the words of the field of a model.
+    """A text such as ``infinity and weave``, with the names of weave and capsize in the field of a model.
 
     Example:
         >>> tmsopt.models.in_words_of(tmsopt.models.from_coefficients([1, "c", "k"]), "infinity and weave")
@@ -382,8 +387,9 @@ class Values(Mapping[str, Any]):
 
     Args:
         parameters: a value for every parameter of the set `of`.
-        extra: quantities besides those of the model, e.g. of the roots.
-        lift: called first for each quantity; returns a variable in its place, or None to use its formula.
+        extra: additional quantities, e.g. of the roots.
+        lift: function that is called first for each quantity. It returns a variable to use as the value, or None to use
+            the formula.
         ranges: free parameter → width of its range; a value far smaller counts as 0.
 
     Example:
@@ -425,7 +431,7 @@ class Values(Mapping[str, Any]):
         return self._computed[name]
 
     def fold(self, formula: Formula, given_values: AnyNumbers = MappingProxyType({})) -> list[Any]:
-        """Outputs of a formula; `given_values` take precedence over these values. Unknown root quantities are nan."""
+        """Evaluate a formula; `given_values` take precedence over these values. Unknown root quantities are nan."""
         unknown = dict.fromkeys(ROOTS, np.nan)
         inputs = {
             n: given_values[n] if n in given_values else self[n] if n in self else unknown[n] for n in formula.inputs
@@ -443,7 +449,7 @@ class Values(Mapping[str, Any]):
             return [float(c.rad()) if c.is_finite() else np.inf for c in model.coefficients(balls, parameter_set)]
 
     def with_known(self, numbers: AnyNumbers) -> "Values":
-        """Values of the same design in which some quantities have given numbers instead of their formulas."""
+        """Values of the same design in which some quantities are given numbers and not computed by their formulas."""
         result = copy(self)
         result._known, result._computed = {**self._known, **numbers}, {}
         return result

@@ -29,7 +29,7 @@ _GREEK = re.compile(
     "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|phi|chi|psi|omega"
     "|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega"
 )
-_MAX_INLINE = 80  # most characters of a repeated part; a longer part gets a number and is written once
+_MAX_INLINE = 80  # a part of a formula with more characters gets a number and is written once
 
 
 def name_fault(name: Any, of_H: bool = False) -> str:
@@ -44,7 +44,7 @@ def name_fault(name: Any, of_H: bool = False) -> str:
 
 
 def latex(name: str) -> str:
-    """A name as LaTeX: ``mu_1`` and ``mu1`` as μ with an index, ``k_max`` with an upright index.
+    """A name as LaTeX: ``mu_1`` and ``mu1`` become μ with an index, and ``k_max`` gets an upright index.
 
     Example:
         >>> tmsopt.models.latex("x2")
@@ -52,15 +52,15 @@ def latex(name: str) -> str:
 
     More: docs/tutorials/own_system.md
     """
-    first, *indices = filter(None, name.split("_"))
-    if numbered := re.fullmatch(r"([A-Za-z]+)(\d+)", first):
-        first, indices = numbered[1], [numbered[2], *indices]
-    symbol = f"\\{first}" if _GREEK.fullmatch(first) else _upright(first)
+    base, *indices = filter(None, name.split("_"))
+    if numbered := re.fullmatch(r"([A-Za-z]+)(\d+)", base):
+        base, indices = numbered[1], [numbered[2], *indices]
+    symbol = f"\\{base}" if _GREEK.fullmatch(base) else _upright(base)
     return f"{symbol}_{{{','.join(map(_upright, indices))}}}" if indices else symbol
 
 
 def _upright(word: str) -> str:
-    """A word in upright letters; single letters and numbers unchanged."""
+    """The LaTeX of a word in upright letters; single letters and numbers stay unchanged."""
     return word if len(word) == 1 or word.isdigit() else rf"\mathrm{{{word}}}"
 
 
@@ -90,18 +90,18 @@ _SPELLINGS: Mapping[str, Callable[..., str]] = {
 
 
 def spell_formula(formula: Formula) -> tuple[list[str], list[str]]:
-    """The outputs of a formula as texts with every digit of its doubles, and the long parts, written once.
+    """The outputs of a formula as texts with all digits of their doubles, and the list of the long parts.
 
     Formulas with equal texts are equal.
     """
-    shared: list[str] = []
+    long_parts: list[str] = []
 
-    def part(text: str) -> str:
+    def number_if_long(text: str) -> str:
         if len(text) <= _MAX_INLINE:
             return text
-        shared.append(text)
-        return f"[{len(shared)}]"
+        long_parts.append(text)
+        return f"[{len(long_parts)}]"
 
-    operations = {name: lambda *o, spell=spell: part(spell(*o)) for name, spell in _SPELLINGS.items()}
+    operations = {name: lambda *o, spell=spell: number_if_long(spell(*o)) for name, spell in _SPELLINGS.items()}
     kind = Kind(operations, lambda x: repr(float(as_double(x))).removesuffix(".0"))
-    return fold(formula, {name: name for name in formula.names}, kind), shared
+    return fold(formula, {name: name for name in formula.names}, kind), long_parts

@@ -1,4 +1,4 @@
-"""TOML files of this package."""
+"""Reads the TOML files of this package."""
 
 import tomllib
 from functools import cache

@@ -8,17 +8,18 @@ from tmsopt.algebra.formula import Constant, Formula, Kind, fold
 from tmsopt.algebra.kinds import FLOATS
 
 _SUM, _PRODUCT, _POWER, _ATOM = range(4)
+"""Precedences, from the lowest to the highest."""
 
 
 class Typeset(NamedTuple):
-    """LaTeX of a part of a formula, and its precedence: lowest for a sum, highest for a single symbol."""
+    """LaTeX of a part of a formula, and the precedence of its outermost operation; a single symbol has the highest."""
 
     text: str
     precedence: int = _ATOM
 
-    def enclose(self, least: int) -> str:
-        """The LaTeX, in parentheses if its precedence is below `least`."""
-        return self.text if self.precedence >= least else rf"\left({self.text}\right)"
+    def enclose(self, min_precedence: int) -> str:
+        """The LaTeX, in parentheses if its precedence is below `min_precedence`."""
+        return self.text if self.precedence >= min_precedence else rf"\left({self.text}\right)"
 
 
 def _sum(a: Typeset, b: Typeset) -> Typeset:
@@ -67,7 +68,10 @@ LATEX = Kind(
         "add": _sum,
         "sub": lambda a, b: Typeset(f"{a.text} - {b.enclose(_PRODUCT)}", _SUM),
         "mul": _product,
-        **dict.fromkeys(("div", "quotient", "ratio"), lambda a, b: Typeset(rf"\frac{{{a.text}}}{{{b.text}}}", _POWER)),
+        **dict.fromkeys(
+            ("div", "quotient_or_nan", "quotient_or_zero"),
+            lambda a, b: Typeset(rf"\frac{{{a.text}}}{{{b.text}}}", _POWER),
+        ),
         "neg": lambda a: Typeset(f"-{a.enclose(_PRODUCT)}", _SUM),
         "pow": _power,
         "square": lambda a: _power(a, Typeset("2")),
@@ -76,8 +80,8 @@ LATEX = Kind(
         "less": _relation("<"),
         "at_most": _relation(r"\leq"),
         "equal": _relation("="),
-        "both": _relation(r"\wedge"),
-        "either": _relation(r"\vee"),
+        "and": _relation(r"\wedge"),
+        "or": _relation(r"\vee"),
         "not": lambda a: Typeset(rf"\neg {a.enclose(_ATOM)}", _POWER),
         "choose": _cases,
         "positive_part": lambda a: Typeset(rf"\max\left(0, {a.text}\right)", _POWER),
@@ -86,7 +90,7 @@ LATEX = Kind(
     },
     _number,
 )
-"""Kind of numbers that are LaTeX: `fold` a formula in it, with a `Typeset` for each name."""
+"""A kind whose numbers are LaTeX. To typeset a formula, `fold` it with this kind and a `Typeset` for each name."""
 
 
 def polynomial_text(coefficients: list[Typeset], variable: str = "s") -> str:

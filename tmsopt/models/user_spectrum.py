@@ -1,7 +1,8 @@
 """Converts roots and structures of the internal polynomial to the eigenfrequencies of the user's system.
 
-For a complex H the internal polynomial belongs to a real system of twice the size with a carrier. Its roots are
-s = −i (ω + carrier) and their conjugates; the user sees s = −i ω with the multiplicities of H.
+For a complex H, the internal polynomial belongs to a real system of twice the size with a carrier: a real constant that
+is added to all eigenfrequencies ω. Its roots are s = −i (ω + carrier) and their conjugates. The user sees s = −i ω with
+the multiplicities of H.
 """
 
 import math
@@ -21,14 +22,14 @@ from tmsopt.roots.patterns.complex_patterns import (
 from tmsopt.roots.patterns.composed import pattern_names
 from tmsopt.roots.patterns.descriptions import describe_structure
 
-ON_AXIS = 1e-12
+AXIS_TOLERANCE = 1e-12
 """A real part below this share of the largest root counts as 0, because it may come from rounding."""
 
 _ROUNDING = 1e-14  # a few rounding errors, as a share of the largest root
 
 
 def pattern_of(model: Model, name: str) -> Pattern:
-    """The pattern with a name, for the roots of a model or the eigenfrequencies of its complex H.
+    """The pattern with a name, for the roots of a model; for a complex H, for the eigenfrequencies.
 
     Raises:
         ValueError: if the name is unknown, or the pattern needs more roots than the model has.
@@ -37,7 +38,7 @@ def pattern_of(model: Model, name: str) -> Pattern:
 
 
 def patterns_of(model: Model) -> tuple[str, ...]:
-    """Names of the patterns of a model that are not combinations of other patterns."""
+    """Names of the patterns of a model that are not composed of other patterns."""
     return pattern_names(model.degree) if model.carrier is None else complex_pattern_names(model.degree // 2)
 
 
@@ -90,23 +91,23 @@ def polynomial_structure(model: Model, name: str, roots: Sequence[Root]) -> Stru
     return Structure(real_form_name(name), tuple(w for r in lower for w in (replace(r, im=-r.im), r)), 0.0)
 
 
-def describe_user_structure(model: Model, structure: str, gain: bool = False) -> str:
-    """A user's structure in words, which for a complex H depend on whether it has `gain`."""
+def describe_user_structure(model: Model, structure: str, has_gain: bool = False) -> str:
+    """A user's structure in words, which for a complex H depend on whether it has gain."""
     if model.carrier is None:
         return describe_structure(structure, model.degree)
-    return describe_complex_structure(structure, model.degree // 2, gain)
+    return describe_complex_structure(structure, model.degree // 2, has_gain)
 
 
 def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """ω = i s for the user's roots; empty for a real system."""
-    clean_roots = () if model.carrier is None else remove_rounding(model, roots)
-    return tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in clean_roots)
+    rounded_roots = () if model.carrier is None else remove_rounding(model, roots)
+    return tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in rounded_roots)
 
 
 def remove_rounding(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """The user's roots, in which real and imaginary parts as small as the rounding error of the carrier are 0."""
     all_roots = tuple(roots)
-    rounding = 0.0 if model.carrier is None else _ROUNDING * _size(model, all_roots)
+    rounding = 0.0 if model.carrier is None else _ROUNDING * _max_modulus(model, all_roots)
     parts = ([x if abs(x) > rounding else 0.0 for x in (r.re, r.im)] for r in all_roots)
     return tuple(Root(re, im, r.multiplicity) for (re, im), r in zip(parts, all_roots, strict=True))
 
@@ -114,19 +115,20 @@ def remove_rounding(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
 def roots_on_axis(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """The user's roots on the imaginary axis, which are real eigenfrequencies of H."""
     all_roots = tuple(roots)
-    return tuple(r for r in all_roots if abs(r.re) <= ON_AXIS * _size(model, all_roots))
+    return tuple(r for r in all_roots if abs(r.re) <= AXIS_TOLERANCE * _max_modulus(model, all_roots))
 
 
-def beyond_axis(model: Model, located: Sequence[str], roots: Sequence[Root]) -> float | None:
-    """Distance of the rightmost root to the right of the imaginary axis, 0 if no root is there.
+def distance_beyond_axis(model: Model, located: Sequence[str], roots: Sequence[Root]) -> float | None:
+    """Distance of the rightmost root from the imaginary axis if it lies to the right of the axis, else 0.
 
-    None if no located pattern has roots on the axis.
+    None if no pattern in `located` has roots on the axis.
     """
     if not roots or all(pattern_of(model, name).rest is None for name in located):
         return None
     rightmost = max(r.re for r in roots)
-    return rightmost if rightmost > ON_AXIS * _size(model, roots) else 0.0
+    return rightmost if rightmost > AXIS_TOLERANCE * _max_modulus(model, roots) else 0.0
 
 
-def _size(model: Model, roots: Iterable[Root]) -> float:
+def _max_modulus(model: Model, roots: Iterable[Root]) -> float:
+    """Largest |s| of the roots of the polynomial; for a complex H it includes the carrier."""
     return max((math.hypot(r.re, r.im - (model.carrier or 0.0)) for r in roots), default=0.0)

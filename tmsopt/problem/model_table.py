@@ -7,7 +7,7 @@ from typing import Any
 from tmsopt.errors import Fault, is_number, limit_advice, short, suggest, text_faults
 from tmsopt.models import Model, Unfit, from_coefficients, from_hamiltonian, from_matrices
 from tmsopt.models.model import Matrix
-from tmsopt.models.stated.texts import parse_entries, place
+from tmsopt.models.stated.texts import describe_position, parse_entries
 from tmsopt.problem.toml import Tables
 
 _MATRICES = ("M", "D", "K", "A", "B", "C", "G", "H")
@@ -115,6 +115,6 @@ def _read_rows(entries: Any, key: str, fault: Callable[..., None]) -> Matrix:
     for i, row in enumerate(rows, start=1):
         for j, x in enumerate(row, start=1):
             if not is_number(x) and not isinstance(x, str):
-                message = f"{place(key, i, j)}: found {short(x)}"
+                message = f"{describe_position(key, i, j)}: found {short(x)}"
                 fault(f"{message}; accepted: a finite number, or an expression in quotes", key)
     return [[x if is_number(x) or isinstance(x, str) else 0 for x in row] for row in rows]

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from tmsopt.models import inertia_margin
-from tmsopt.models.user_spectrum import beyond_axis, eigenfrequencies, polynomial_structure
+from tmsopt.models.user_spectrum import distance_beyond_axis, eigenfrequencies, polynomial_structure
 from tmsopt.problem.advice.remedies import Relaxation, RequiredValue
 from tmsopt.problem.cases import Case, Cover
 from tmsopt.problem.freedom import Freedom
@@ -180,7 +180,7 @@ class Solution(Printable):
     def beyond_axis(self) -> float | None:
         """Distance of the rightmost root to the right of the axis, for a located pattern on the axis; else None."""
         located = self.problem.posed.located if self.status == "optimal" else ()
-        return beyond_axis(self.problem.model, located, self.roots)
+        return distance_beyond_axis(self.problem.model, located, self.roots)
 
     @property
     def stability_sought(self) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, StrictFloat, StrictInt, StrictStr, ValidationError
 
-from tmsopt.errors import LISTED, Fault, InputError, short
+from tmsopt.errors import MAX_LISTED, Fault, InputError, short
 from tmsopt.files import as_path, read_text
 from tmsopt.problem.advice.lines import suggest_line
 
@@ -20,7 +20,7 @@ MAX_DEPTH = 50
 """Greatest depth of lists and tables."""
 
 _MAX_WORD_LENGTH = 1000  # greatest number of characters of a number or of a name without quotes
-_MAX_EXPLAINED = 10 * LISTED  # greatest number of explained error messages of pydantic; a key may have several
+_MAX_EXPLAINED = 10 * MAX_LISTED  # greatest number of explained error messages of pydantic; a key may have several
 
 Number = StrictFloat | StrictInt | StrictStr
 """A number, or a text with a unit."""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict, TypeVar
 
-from tmsopt.errors import MOST_STARTS, Fault, InputError, call_faults, count_faults, is_number, short, suggest
+from tmsopt.errors import MOST_STARTS, Fault, InputError, callback_faults, count_faults, is_number, short, suggest
 from tmsopt.progress import Listener, Steps, steps_for
 
 LINEAR_SOLVERS = ("mumps", "spral")
@@ -127,6 +127,6 @@ def make_options(
     if values["linear_solver"] not in LINEAR_SOLVERS:
         message = f"found {short(values['linear_solver'])}; accepted: {' '.join(LINEAR_SOLVERS)}"
         faults.append(Fault(message, ("linear_solver",)))
-    if faults := [*faults, *call_faults("progress", values["progress"])]:
+    if faults := [*faults, *callback_faults("progress", values["progress"])]:
         raise InputError(faults)
     return Options(**values | {"progress": steps_for(values["progress"])})

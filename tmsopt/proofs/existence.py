@@ -9,7 +9,7 @@ from typing import Any
 
 import flint
 
-from tmsopt.algebra.balls import GUARD, largest_radius, upper
+from tmsopt.algebra.balls import GUARD_DIGITS, largest_radius, upper_bound
 from tmsopt.algebra.krawczyk import Enclosure, ProofFailed, enclose_solution, refine_solution
 from tmsopt.models.exact import ExactDesign
 from tmsopt.problem.problem import Posed
@@ -93,7 +93,7 @@ def prove_nearby(
     for _ in range(_MAX_ATTEMPTS):
         with flint.ctx.workdps(working_digits):
             proved_design = _search_nearby(system, design, stored_values, working_digits - _EXTRA_DIGITS // 2)
-            tolerance = flint.arb(10) ** -(digits + GUARD)
+            tolerance = flint.arb(10) ** -(digits + GUARD_DIGITS)
             balls = [*proved_design.parameters.items(), *proved_design.unknowns.items()]
             if all(b.rad() <= tolerance * (system.units.get(n, 1) + abs(b)) for n, b in balls):
                 return proved_design
@@ -107,7 +107,9 @@ def _search_nearby(
     """Try each choice of parameters to move and each start of the unknowns; the first proof counts."""
     problem, pattern = system.problem, system.pattern
     exact_values = _exact_numbers(problem, design)
-    free_names = [n for n in problem.free if n not in {s.removeprefix("tan(").removesuffix(")") for s in design.stated}]
+    free_names = [
+        n for n in problem.free if n not in {s.removeprefix("tan(").removesuffix(")") for s in design.given_exactly}
+    ]
     reasons: list[str] = []
     for candidates in _parameter_choices(problem, stored_values, free_names, system.condition_count):
         for unknowns in _start_values(system, exact_values):
@@ -194,7 +196,7 @@ def _measure_distance(
             which the solution is unique. Next to an EP4, for example, the last bit of a number selects one of many EP3.
     """
     explained = choice.explained
-    distances = {n: upper(abs(enclosure.balls[n] - start[n])) for n in choice.moved}
+    distances = {n: upper_bound(abs(enclosure.balls[n] - start[n])) for n in choice.moved}
     unique_distances = {n: enclosure.uniqueness * units.get(n, 1.0) for n in explained}
     critical_name = max(explained, key=lambda n: explained[n] / unique_distances[n], default=None)
     if critical_name and not explained[critical_name] < unique_distances[critical_name]:

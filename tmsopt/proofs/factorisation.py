@@ -63,7 +63,7 @@ class Factorisation:
             return False
         root_lists = (factor_roots(factor) for factor, _ in self.factors)
         return _all_hold(
-            [self.stable, *(None if roots is None else all(z.real for z in roots) for roots in root_lists)]
+            [self.stable, *(None if roots is None else all(z.is_real for z in roots) for roots in root_lists)]
         )
 
 
@@ -112,7 +112,7 @@ def _choose_extreme(choose: Callable[[Any, Any], Any], balls: Sequence[Any]) -> 
 
 
 def _damping_ratio(root: EnclosedRoot) -> Any:
-    if root.real:
+    if root.is_real:
         return flint.arb(1) if root.re < 0 else flint.arb(-1) if root.re > 0 else None
     return -root.re / (root.re * root.re + root.im * root.im).sqrt()
 
@@ -172,8 +172,8 @@ def _count_multiple_roots(coefficients: Sequence[Any]) -> Counter[tuple[str, int
     counts: Counter[tuple[str, int]] = Counter()
     for factor, multiplicity in factor_polynomial(coefficients).factors:
         for z in (factor_roots(factor) or ()) if multiplicity > 1 else ():
-            if z.real or z.im > 0:
-                counts["EP" if z.real else "CEP", multiplicity] += 1
+            if z.is_real or z.im > 0:
+                counts["EP" if z.is_real else "CEP", multiplicity] += 1
     return counts
 
 
@@ -182,4 +182,4 @@ def _has_imaginary_pair(coefficients: Sequence[Any], order: int) -> bool:
     even, odd = (flint.fmpq_poly([(-1) ** k * c for k, c in enumerate(coefficients[::-1][i::2])]) for i in (0, 1))
     common_factor = even if odd.is_zero() else even.gcd(odd)
     parts = [part for part, m in common_factor.factor()[1] if m >= order]
-    return any(z.real and z.re > 0 for part in parts for z in factor_roots(_monic(part)) or ())
+    return any(z.is_real and z.re > 0 for part in parts for z in factor_roots(_monic(part)) or ())

@@ -97,7 +97,7 @@ def stability_verdict(factorisation: Factorisation, of_H: bool = False) -> Verdi
     if not axis_roots or any(z.re > 0 for z in roots):
         return Verdict(False, f"{subject} is {unstable_side if any(z.re > 0 for z in roots) else f'not {stable_side}'}")
     sentence = (
-        f"{subject} is real" if of_H else "a root is 0" if all(z.real for z in axis_roots) else "a pair is imaginary"
+        f"{subject} is real" if of_H else "a root is 0" if all(z.is_real for z in axis_roots) else "a pair is imaginary"
     )
     is_simple = all(z.multiplicity == 1 for z in roots if z.re <= 0)
     return Verdict(False, sentence + f", the others {inside}: on the boundary of stability" * is_simple)
@@ -126,7 +126,7 @@ def box_verdict(problem: Posed, design: ExactDesign, proved_design: ProvedDesign
             and (exact_value := design.values[name].fraction) is not None
         ):
             value = rational(exact_value)
-        if {name, f"tan({name})"} & set(design.stated) and float(value) in (least, greatest):
+        if {name, f"tan({name})"} & set(design.given_exactly) and float(value) in (least, greatest):
             continue  # the user states the limit exactly
         lo, hi = (problem.exactly({name: end})[name] for end in (least, greatest))
         if value < lo or value > hi:

@@ -290,8 +290,8 @@ def _simple_doubts(problem: Posed, structure: str, proved_design: ProvedDesign) 
     roots = proved_design.factorisation.roots
     if roots is None:
         return ["some roots are equal or too close to isolate; locate the pattern you expect"]
-    other_roots = roots[1:] if roots[0].real else roots[2:]
-    if roots[0].real == (structure == "real") and all(z.re < roots[0].re for z in other_roots):
+    other_roots = roots[1:] if roots[0].is_real else roots[2:]
+    if roots[0].is_real == (structure == "real") and all(z.re < roots[0].re for z in other_roots):
         return []
     return [f"the rightmost root of the design as stored is not certainly {pattern_name}"]
 
@@ -337,7 +337,7 @@ def _assemble(
         ),
         moved=proved_design.moved,
         held=Table(dict(design.text(n) for n in problem.parameter_set.names if n not in proved_design.moved)),
-        stated=design.stated,
+        stated=design.given_exactly,
         numbers=_formula_numbers(problem),
         radius=proved_design.radius,
         uniqueness=proved_design.uniqueness,

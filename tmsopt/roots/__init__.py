@@ -1,7 +1,7 @@
 """Real polynomials and their roots: factored forms, stability, numeric and exact roots, multiplicity.
 
 In: coefficients, highest power first. Out: roots, stability, counts of real roots, and structures. Open `polynomial`
-first; `patterns` finds out which roots coincide, `quartics` solves millions of quartics at once.
+first. `patterns` finds out which roots coincide, and `quartics` solves millions of quartics at once.
 """
 
 from tmsopt.roots.batch import classify, find_motion

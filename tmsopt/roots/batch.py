@@ -14,7 +14,7 @@ _QUARTIC = 5
 
 
 def classify(coefficients: Sequence[ArrayLike]) -> Classes:
-    """Classes of polynomials; the coefficients, highest power first, have shapes that broadcast.
+    """Classes of polynomials. The coefficients come highest power first, and their shapes must broadcast.
 
     Example:
         >>> tmsopt.roots.classify([1, [3, -3], 2]).real_roots  # (s ± 1)(s ± 2)
@@ -26,10 +26,10 @@ def classify(coefficients: Sequence[ArrayLike]) -> Classes:
         return quartic_classes(*coefficients)
     a, shape = flatten_columns(*coefficients)
     rows = np.stack(a, axis=1)
-    kind, count = np.empty((2, len(rows)), np.int8)
+    kinds, counts = np.empty((2, len(rows)), np.int8)
     for block in make_blocks(len(rows)):
-        kind[block], count[block] = count_classes(rows[block])
-    return Classes(kind.reshape(shape), count.reshape(shape), 0)
+        kinds[block], counts[block] = count_classes(rows[block])
+    return Classes(kinds.reshape(shape), counts.reshape(shape), 0)
 
 
 def find_motion(coefficients: Sequence[ArrayLike]) -> Motion:
@@ -45,10 +45,10 @@ def find_motion(coefficients: Sequence[ArrayLike]) -> Motion:
         return abscissa_and_damping(*coefficients)
     a, shape = flatten_columns(*coefficients)
     rows = np.stack(a, axis=1)
-    alpha, ratio = np.full((2, len(rows)), np.nan)
-    regular = np.flatnonzero(np.all(np.isfinite(rows), axis=1) & (rows[:, 0] != 0))
-    for block in make_blocks(regular.size):
-        columns = regular[block]
-        z = roots(rows[columns])
-        alpha[columns], ratio[columns] = z.real.max(axis=1), np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
-    return Motion(alpha.reshape(shape), ratio.reshape(shape), regular.size)
+    abscissae, ratios = np.full((2, len(rows)), np.nan)
+    regular_rows = np.flatnonzero(np.all(np.isfinite(rows), axis=1) & (rows[:, 0] != 0))
+    for block in make_blocks(regular_rows.size):
+        selected = regular_rows[block]
+        z = roots(rows[selected])
+        abscissae[selected], ratios[selected] = z.real.max(axis=1), np.min(-z.real / (np.abs(z) + 1e-300), axis=1)
+    return Motion(abscissae.reshape(shape), ratios.reshape(shape), regular_rows.size)

@@ -12,9 +12,9 @@ from tmsopt.records import Array, Complex
 
 Matrix = Sequence[Sequence[Any]]
 
-_OFFSETS = ((0.31, 0.17), (-0.43, 0.71), (1.13, -0.59))  # of arbitrary test points, relative to |s|
-_ROUNDING = 1e-16
-_SWEEPS = 8  # of the equilibration; each halves the spread of the logarithms
+_OFFSETS = ((0.31, 0.17), (-0.43, 0.71), (1.13, -0.59))  # distances of arbitrary test points from s, divided by |s|
+_ROUNDING = 1e-16  # a smaller relative singular value counts as this value
+_SWEEPS = 8  # sweeps of `equilibrate`; each halves the spread of the logarithms of the sizes
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Jordan:
         geometric: number of independent eigenvectors.
         partial: lengths of the Jordan chains, longest first; empty if the ranks contradict the multiplicity.
         zero: the largest relative singular value of the equilibrated matrix that counts as 0.
-        nonzero: the smallest one that does not; inf if there is none.
+        nonzero: the smallest of these singular values that does not count as 0; inf if there is none.
         threshold: upper limit of the singular values that may count as 0.
     """
 
@@ -37,7 +37,7 @@ class Jordan:
 
 
 def is_regular(matrices: Sequence[Matrix], s: Any, threshold: float) -> bool:
-    """Whether det L is not identically 0, judged at three arbitrary points at distances of the size of the roots.
+    """Whether det L(s), with L as in `jordan`, is nonzero for some s; it is tested at three arbitrary points.
 
     Example:
         >>> import flint
@@ -58,12 +58,12 @@ def jordan(matrices: Sequence[Matrix], s: Any, multiplicity: int, threshold: flo
 
     The nullity of L(s) is the geometric multiplicity. The nullities of the block Toeplitz matrices of L(s), L′(s),
     L″(s)/2 … give the number of chains of each length. Rows and columns are scaled to the size of the terms of L(s), so
-    that units do not matter. At least one singular value counts as 0, and none above `threshold`; within these limits
-    the widest gap decides.
+    that units do not matter. At least one singular value counts as 0, and none above `threshold` does. Within these
+    limits, the widest gap between the singular values decides.
 
     Args:
         matrices: Pₖ in descending powers, as balls; s is a ball too, so that no digit is lost where terms cancel.
-        least: lower limit of the unit of eigenvalues, for an s that is small compared with others.
+        least: lower limit of the unit of eigenvalues. It matters if |s| is small compared with the other eigenvalues.
 
     Example:
         >>> import flint
@@ -85,28 +85,28 @@ def jordan(matrices: Sequence[Matrix], s: Any, multiplicity: int, threshold: flo
     return Jordan(geometric, partial, float(values[geometric - 1]), nonzero, threshold)
 
 
-def _nullity(values: Array, least: int, most: int, threshold: float) -> int:
-    """Number of singular values, in ascending order, that count as 0."""
-    most = min(most, len(values), max(least, int(np.sum(values <= threshold))))
+def _nullity(values: Array, min_count: int, max_count: int, threshold: float) -> int:
+    """Number of singular values that count as 0; the values are in ascending order."""
+    max_count = min(max_count, len(values), max(min_count, int(np.sum(values <= threshold))))
     logarithms = np.log(np.maximum(np.append(values, 1.0), _ROUNDING))
-    return least + int(np.argmax(logarithms[least : most + 1] - logarithms[least - 1 : most]))
+    return min_count + int(np.argmax(logarithms[min_count : max_count + 1] - logarithms[min_count - 1 : max_count]))
 
 
 def _chain_lengths(blocks: Sequence[Complex], multiplicity: int, geometric: int, threshold: float) -> tuple[int, ...]:
-    """Lengths of the Jordan chains, from the numbers of chains of length at least 1, 2 …"""
+    """Lengths of the Jordan chains, longest first; empty if they do not add up to the multiplicity."""
     if geometric == 1:
         return (multiplicity,)
     largest = max(float(np.linalg.norm(block, 2)) for block in blocks)
-    counts = [geometric]  # of chains of length at least 1, 2 …
+    counts = [geometric]  # numbers of chains of length at least 1, 2 …
     nullity = geometric
     while nullity < multiplicity and counts[-1]:
         size = len(counts) + 1
         padded = [*blocks, *[np.zeros_like(blocks[0])] * size]  # derivatives beyond the degree are 0
         toeplitz = np.block([[padded[i - j] if i >= j else padded[-1] for j in range(size)] for i in range(size)])
         values = np.linalg.svd(toeplitz, compute_uv=False)
-        larger = _nullity(values[::-1] / largest, nullity, nullity + counts[-1], threshold)
-        counts.append(larger - nullity)
-        nullity = larger
+        next_nullity = _nullity(values[::-1] / largest, nullity, nullity + counts[-1], threshold)
+        counts.append(next_nullity - nullity)
+        nullity = next_nullity
     lengths = tuple(sum(count > k for count in counts) for k in range(geometric))
     return lengths if sum(lengths) == multiplicity else ()
 
@@ -120,7 +120,7 @@ def _derivative(matrices: Sequence[Matrix], s: Any, order: int) -> list[list[Any
 
 
 def has_one_eigenvector(matrices: Sequence[Matrix], s: Any) -> bool:
-    """Whether the rank of L(s) is proved to be at least n − 1, by a minor of that order that is not 0 in balls.
+    """Whether the n × n matrix L(s) is proved to have the rank n − 1 or n, by a minor whose ball does not contain 0.
 
     Example:
         >>> import flint
@@ -143,8 +143,8 @@ def exact_nullity(matrices: Sequence[Matrix], factor: Any) -> int:
     """Number of independent eigenvectors at each root of an irreducible factor of det L, in exact fractions.
 
     Args:
-        matrices: with entries ``fmpq``.
-        factor: ``fmpq_poly``.
+        matrices: their entries are of the type ``fmpq``.
+        factor: the irreducible factor, of the type ``fmpq_poly``.
 
     Example:
         >>> from flint import fmpq, fmpq_poly
@@ -161,8 +161,8 @@ def exact_longest(matrices: Sequence[Matrix], factor: Any, multiplicity: int) ->
     """Length of the longest Jordan chain at each root of an irreducible factor of det L, in exact fractions.
 
     Args:
-        matrices: with entries ``fmpq``.
-        factor: ``fmpq_poly``.
+        matrices: their entries are of the type ``fmpq``.
+        factor: the irreducible factor, of the type ``fmpq_poly``.
         multiplicity: how often the factor occurs in det L.
 
     Example:
@@ -182,10 +182,10 @@ def exact_longest(matrices: Sequence[Matrix], factor: Any, multiplicity: int) ->
         blocks.append([[x.derivative() / length for x in row] for row in blocks[-1]])
         steps = range(length + 1)
         toeplitz = [[blocks[a - b][i][j] if a >= b else zero for b in steps for j in size] for a in steps for i in size]
-        longer = _nullity_modulo(toeplitz, factor)
-        if longer == nullity:
+        next_nullity = _nullity_modulo(toeplitz, factor)
+        if next_nullity == nullity:
             return length
-        nullity = longer
+        nullity = next_nullity
     return multiplicity
 
 
@@ -197,19 +197,21 @@ def _polynomials(matrices: Sequence[Matrix]) -> list[list[Any]]:
 
 def _nullity_modulo(rows: Sequence[Sequence[Any]], factor: Any) -> int:
     """Nullity of a square matrix of polynomials at each root of an irreducible factor."""
-    remaining = [[x % factor for x in row] for row in rows]
+    remaining_rows = [[x % factor for x in row] for row in rows]
     for j in range(len(rows)):
-        pivot = next((row for row in remaining if row[j] != 0), None)
+        pivot = next((row for row in remaining_rows if row[j] != 0), None)
         if pivot is None:
             continue
         inverse = pivot[j].xgcd(factor)[1]
-        others = (row for row in remaining if row is not pivot)
-        remaining = [[(x - row[j] * inverse * y) % factor for x, y in zip(row, pivot, strict=True)] for row in others]
-    return len(remaining)
+        other_rows = (row for row in remaining_rows if row is not pivot)
+        remaining_rows = [
+            [(x - row[j] * inverse * y) % factor for x, y in zip(row, pivot, strict=True)] for row in other_rows
+        ]
+    return len(remaining_rows)
 
 
 def equilibrate(matrices: Sequence[Any], unit: float) -> tuple[Array, Array]:
-    """Sizes of the entries of L at eigenvalues of size `unit`, and powers of two that bring rows and columns near 1."""
+    """Sizes of the entries of L(s) for |s| = `unit`, and powers of two; the products have rows and columns near 1."""
     d = len(matrices) - 1
     size = np.asarray(sum(np.abs(P) * (unit ** (d - k)) for k, P in enumerate(matrices)), dtype=float)
     rows, columns = np.ones((2, len(size)))

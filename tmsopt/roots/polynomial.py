@@ -83,7 +83,7 @@ def quadratic_pencil(M: Sequence[Coefficients], D: Sequence[Coefficients], K: Se
 def determinant(matrix: Sequence[Sequence[Coefficients]]) -> list[Any]:
     """Coefficients of the determinant of a square matrix whose entries are polynomials.
 
-    Laplace expansion with every minor computed once: no division, n 2ⁿ products.
+    The method is Laplace expansion, which computes every minor once: n 2ⁿ products and no division.
 
     Example:
         >>> tmsopt.roots.determinant([[[1, 0], [-1]], [[1], [1, 2]]])  # s (s + 2) + 1
@@ -110,15 +110,15 @@ def determinant(matrix: Sequence[Sequence[Coefficients]]) -> list[Any]:
 
 
 def characteristic_polynomial(A: Sequence[Sequence[Any]]) -> list[Any]:
-    """Coefficients of det(s I − A), descending from 1, by the algorithm of Samuelson and Berkowitz (n⁴/4 products)."""
+    """Coefficients of det(s I − A), descending from 1, by the algorithm of Samuelson and Berkowitz in n⁴/4 products."""
     monic: list[Any] = [1]
     for n in range(len(A)):
         row, column = A[n][:n], [A[i][n] for i in range(n)]
-        first: list[Any] = [1, -A[n][n]]
+        toeplitz_column: list[Any] = [1, -A[n][n]]
         for _ in range(n):
-            first.append(-_dot(row, column))
+            toeplitz_column.append(-_dot(row, column))
             column = [_dot(A[i][:n], column) for i in range(n)]
-        monic = [_dot(first[k::-1], monic[: k + 1]) for k in range(n + 2)]
+        monic = [_dot(toeplitz_column[k::-1], monic[: k + 1]) for k in range(n + 2)]
     return monic
 
 
@@ -129,7 +129,7 @@ def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
 
 @dataclass(frozen=True)
 class Root:
-    """A root with its multiplicity; a complex pair is two of these.
+    """A root with its multiplicity. A complex pair is two `Root` objects.
 
     Example:
         >>> tmsopt.roots.exact_roots([1, 4, 6, 4, 1])  # (s + 1)⁴
@@ -149,5 +149,5 @@ class Root:
 
 
 def rightmost_first(roots: Iterable[Any]) -> tuple[Any, ...]:
-    """Sort roots with attributes re and im, doubles or balls, rightmost first; of a pair the upper one first."""
+    """Sort roots, rightmost first, and the upper root of a pair first. Their `re` and `im` may be doubles or balls."""
     return tuple(sorted(roots, key=lambda r: (-float(r.re), -float(r.im))))

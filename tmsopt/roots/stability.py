@@ -34,7 +34,7 @@ def _hurwitz_minor(coefficients: Coefficients, m: int) -> Any:
             return a1
         case 2, [a0, a1, a2, *higher]:
             return a1 * a2 - higher[0] * a0 if higher else a1 * a2
-        case 3, [a0, a1, a2, a3, *higher]:  # computed often, therefore written with few products
+        case 3, [a0, a1, a2, a3, *higher]:  # this case is frequent, so it has few products
             minor = a1 * (a2 * a3 - higher[0] * a1 if higher else a2 * a3) - a3 * (a0 * a3)
             return minor + higher[1] * (a0 * a1) if higher[1:] else minor
 
@@ -61,11 +61,11 @@ def lienard_chipart(coefficients: Coefficients) -> list[Any]:
 
 
 def routh(coefficients: Coefficients) -> list[Any]:
-    """First column of Routh's scheme after a0: all positive if and only if every root has Re s < 0, given a0 > 0.
+    """First column of Routh's scheme after a0. If a0 > 0, all are positive exactly if every root has Re s < 0.
 
     The numbers must allow division: floats, arrays, fractions or balls (intervals with a midpoint and a radius).
-    Routh's scheme takes fewer operations than `lienard_chipart`, which needs no division. Entries after a 0 have no
-    meaning.
+    Routh's scheme takes fewer operations than `lienard_chipart`, which needs no division. Entries after an entry 0 have
+    no meaning.
 
     Example:
         >>> tmsopt.roots.routh([1.0, 2.0, 3.0, 4.0])
@@ -78,12 +78,12 @@ def routh(coefficients: Coefficients) -> list[Any]:
 
 def _iterate_routh(coefficients: Coefficients) -> Iterator[Any]:
     """Yield the entries of `routh` one by one, so that the caller can stop before a division by 0."""
-    above, row = list(coefficients[0::2]), list(coefficients[1::2])
+    row_above, row = list(coefficients[0::2]), list(coefficients[1::2])
     while row:
         yield row[0]
-        ratio = above[0] / row[0]
+        ratio = row_above[0] / row[0]
         padded = [*row[1:], None]
-        above, row = row, [a if b is None else a - ratio * b for a, b in zip(above[1:], padded, strict=False)]
+        row_above, row = row, [a if b is None else a - ratio * b for a, b in zip(row_above[1:], padded, strict=False)]
 
 
 def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
@@ -92,9 +92,9 @@ def is_stable(coefficients: ArrayLike, exact: bool = True) -> NDArray[np.bool_]:
     A polynomial with a leading coefficient 0 has a root at infinity and counts as unstable.
 
     Args:
-        exact: use exact arithmetic where rounding errors could change a sign (about 0.1 ms a polynomial). The given
-            doubles count as exact numbers. It has no effect up to degree 4, where the Liénard–Chipart
-            conditions in doubles decide.
+        exact: use exact arithmetic if rounding errors could change a sign, which takes about 0.1 ms for a polynomial.
+            The given doubles count as exact numbers. The argument has no effect up to degree 4, where the
+            Liénard–Chipart conditions in doubles decide.
 
     Raises:
         ValueError: for fewer than two coefficients.
@@ -128,10 +128,10 @@ def _is_stable_by_routh(c: Array, exact: bool) -> NDArray[np.bool_]:
     if not exact:
         error = np.zeros_like(value)
     # The first entry that is not surely positive decides; entries after it have no meaning.
-    first = np.argmin(value > error, axis=1)[:, None]
-    decisive, bound = (np.take_along_axis(x, first, axis=1)[:, 0] for x in (value, error))
-    stable[rows] = decisive > bound
-    for k in rows[~(np.abs(decisive) > bound)] if exact else ():
+    decisive_index = np.argmin(value > error, axis=1)[:, None]
+    decisive_entry, bound = (np.take_along_axis(x, decisive_index, axis=1)[:, 0] for x in (value, error))
+    stable[rows] = decisive_entry > bound
+    for k in rows[~(np.abs(decisive_entry) > bound)] if exact else ():
         stable[k] = all(x > 0 for x in _iterate_routh([flint.fmpq(*a.as_integer_ratio()) for a in flat[k].tolist()]))
     return np.asarray(stable.reshape(c.shape[:-1]))
 

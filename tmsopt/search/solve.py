@@ -14,7 +14,7 @@ from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.evaluation.exclusion import bound_without_search
 from tmsopt.evaluation.recheck import Evaluation
 from tmsopt.evaluation.stored import find_storable_design
-from tmsopt.models.user_spectrum import beyond_axis, polynomial_structure, remove_rounding, user_structure_name
+from tmsopt.models.user_spectrum import distance_beyond_axis, polynomial_structure, remove_rounding, user_structure_name
 from tmsopt.problem import (
     Bound,
     NotSolved,
@@ -376,7 +376,7 @@ def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str
         return (f"the mass matrix is singular (a0 = 0), so a root is at infinity; {write_mass_advice(problem)}",)
     violated_limits = [n for n, c in problem.conditions.items() if n in checked.violations and "abscissa" in c.names]
     unstable_note = (UNSTABLE,) if violated_limits and checked.structure.abscissa >= 0 else ()
-    real_part = beyond_axis(problem.model, problem.located, checked.structure.roots) if is_optimal else None
+    real_part = distance_beyond_axis(problem.model, problem.located, checked.structure.roots) if is_optimal else None
     if real_part:
         words = "root has real part" if problem.model.carrier is None else "eigenfrequency has gain"
         return (f"not the edge of stability: another {words} {unit_of(problem, 'abscissa').show(real_part, 2)}",)

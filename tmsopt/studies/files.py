@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import Field, StrictBool, StrictInt, StrictStr
 
-from tmsopt.errors import LISTED, Fault, InputError, count_faults, escape_unprintable, is_number, short, suggest
+from tmsopt.errors import MAX_LISTED, Fault, InputError, count_faults, escape_unprintable, is_number, short, suggest
 from tmsopt.files import read_lines
 from tmsopt.problem.files import as_solvable, problem_from_tables
 from tmsopt.problem.freedom import find_objective_faults
@@ -117,7 +117,7 @@ def _read_number(value: Any, unit: str, key: Key, faults: list[Fault]) -> float:
     if is_number(value):
         return float(value)
     message = f"found {short(value)}; accepted: a finite number"
-    if isinstance(value, str) and len(faults) <= LISTED:  # further faults are only counted
+    if isinstance(value, str) and len(faults) <= MAX_LISTED:  # further faults are only counted
         try:
             return parse_quantity(value, unit)
         except ValueError as error:

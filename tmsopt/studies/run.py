@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.errors import Fault, InputError, call_faults, count_faults, input_error, short, suggest
-from tmsopt.executor import Crash, Executor, Note, cluster, cores, here, ignore_note, processes
+from tmsopt.errors import Fault, InputError, callback_faults, count_faults, input_error, short, suggest
+from tmsopt.executor import Crash, Executor, Note, cluster, cores, ignore_note, in_process, processes
 from tmsopt.files import as_path
 from tmsopt.problem.unit_system import units_of
 from tmsopt.progress import Listener, start_steps
@@ -160,7 +160,7 @@ def run_study(
     More: docs/tutorials/study.md
     """
     request = load_study(study) if isinstance(study, str | PathLike) else study
-    faults = call_faults("progress", progress)
+    faults = callback_faults("progress", progress)
     if not isinstance(request, Study | Sampling):
         accepted = "a Study, such as from tmsopt.over_grid, or the path of a study file"
         faults.append(Fault(f"found {short(request)}; accepted: {accepted}", ("study",)))
@@ -267,7 +267,7 @@ def _choose_executor(count: int, workers: int | None, scheduler: str | None, not
     if scheduler is not None:
         return cluster(scheduler, note)
     workers = workers or (1 if count <= _MAX_ROWS_WITHOUT_WORKERS else cores())
-    return here() if workers == 1 else processes(workers, note)
+    return in_process() if workers == 1 else processes(workers, note)
 
 
 def _solve_rows(study: Study, remaining: set[int], executor: Executor, note: Note) -> Generator[Row]:

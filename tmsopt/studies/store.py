@@ -282,8 +282,8 @@ def _describe_study(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
         "platform": platform.platform(),
         "versions": json.dumps(_versions()),
     }
-    if len(about["definition"]) > files.LARGEST_JSON:
-        message = f"its definition has more than {files.LARGEST_JSON} characters; give the values in a CSV file"
+    if len(about["definition"]) > files.MAX_JSON_CHARACTERS:
+        message = f"its definition has more than {files.MAX_JSON_CHARACTERS} characters; give the values in a CSV file"
         raise input_error(message, "study")
     return about, columns
 
@@ -309,7 +309,7 @@ def _copy_store(old: sqlite3.Connection, new: sqlite3.Connection) -> None:
 @contextmanager
 def _replace_database(path: Path) -> Iterator[sqlite3.Connection]:
     """An empty database that replaces the file at a path on success; the caller must hold the lock."""
-    with files.write_atomic(path, locked=True) as place, closing(_connect(place, "rwc")) as connection:
+    with files.write_atomic(path, is_locked=True) as place, closing(_connect(place, "rwc")) as connection:
         yield connection
 
 

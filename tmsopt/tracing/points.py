@@ -11,7 +11,7 @@ from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import lienard_chipart, roots
 from tmsopt.roots.patterns.pattern import mean_size
-from tmsopt.roots.sign_tests import CLOSED, opposite_roots_test
+from tmsopt.roots.sign_tests import MAX_CLOSED_FORM_DEGREE, opposite_roots_test
 from tmsopt.tracing.branch import name_unknowns
 from tmsopt.tracing.equations import TracingSetup, design_at
 
@@ -159,4 +159,8 @@ def is_on_axis(z: Complex) -> Truth:
 
 def axis_functions(factor: list[Any]) -> list[Any]:
     """Functions of a factor. One of them vanishes if a root is on the imaginary axis, the first one if a root is 0."""
-    return lienard_chipart(factor) if len(factor) - 1 <= CLOSED else [factor[-1], opposite_roots_test(factor)]
+    return (
+        lienard_chipart(factor)
+        if len(factor) - 1 <= MAX_CLOSED_FORM_DEGREE
+        else [factor[-1], opposite_roots_test(factor)]
+    )

@@ -9,7 +9,7 @@ import numpy as np
 from tmsopt.problem.problem import Posed
 from tmsopt.program.starts import sample_box
 from tmsopt.records import Array, Truth
-from tmsopt.roots.sign_tests import CLOSED
+from tmsopt.roots.sign_tests import MAX_CLOSED_FORM_DEGREE
 from tmsopt.tracing.continuation import INFINITE, Curve, Walk, is_on_walk, walk_both_ways
 from tmsopt.tracing.equations import TracingSetup, compute_coefficients, design_at
 from tmsopt.tracing.solving import project_rows
@@ -39,7 +39,7 @@ def find_missed_designs(
     causes most of these sign changes.
     """
     low, high = np.array(list(problem.free.values())).T
-    point_count = _GRID_POINTS if problem.model.degree <= CLOSED else _GRID_POINTS_AT_HIGH_DEGREE
+    point_count = _GRID_POINTS if problem.model.degree <= MAX_CLOSED_FORM_DEGREE else _GRID_POINTS_AT_HIGH_DEGREE
     grid = np.stack(np.meshgrid(*[np.linspace(0, 1, point_count)] * 2, indexing="ij"), axis=-1)
     with np.errstate(all="ignore"):
         a = compute_coefficients(

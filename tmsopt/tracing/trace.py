@@ -11,7 +11,7 @@ from tmsopt.errors import (
     MOST_STARTS,
     Fault,
     InputError,
-    call_faults,
+    callback_faults,
     count_faults,
     input_error,
     is_number,
@@ -151,7 +151,7 @@ def check_options(
         InputError: with all faults.
     """
     faults = [fault for count in counts for fault in count_faults(*count)]
-    faults += [*call_faults("progress", progress), *list_faults("through", through, _DESIGN_EXAMPLE)]
+    faults += [*callback_faults("progress", progress), *list_faults("through", through, _DESIGN_EXAMPLE)]
     if not is_number(step) or not STEP_RANGE[0] <= step <= STEP_RANGE[1]:
         faults.append(
             Fault(f"found {step!r}; accepted: a number from {STEP_RANGE[0]:g} to {STEP_RANGE[1]:g}", ("step",))

@@ -14,7 +14,7 @@ from benchmarks.reports.tables import Asked, page, table, times
 from benchmarks.suites import PROBLEMS
 from benchmarks.timing import best, ipopt_runs
 from tmsopt import Study, load, over_grid, run_study
-from tmsopt.executor import Executor, cluster, here, processes
+from tmsopt.executor import Executor, cluster, in_process, processes
 from tmsopt.studies import Solver
 
 
@@ -57,7 +57,7 @@ def scaling(study: Study, workers: int) -> float:
 
     From the time that all of them have delivered until the last row: what it takes to start them is seconds, and once.
     """
-    return _rate(study, processes(workers) if workers else here(), max(workers, 1))
+    return _rate(study, processes(workers) if workers else in_process(), max(workers, 1))
 
 
 def dask_scaling(study: Study, workers: int) -> float:

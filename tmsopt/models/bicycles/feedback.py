@@ -1,7 +1,8 @@
 """Controllers of bicycles: torques on lean and steer from lean, lean rate, steer and steer rate.
 
-M q″ + D q′ + K q = −G (φ, δ, φ′, δ′), q = (lean, steer), so the gains add to D and K. With a lag of the actuators,
-lag T′ + T = −G (…), so the equation of each torque T is multiplied by lag s + 1.
+The equations are M q″ + D q′ + K q = −G (φ, δ, φ′, δ′) with q = (lean, steer), so the gains are added to D and K. If
+the actuators have a lag, a torque T follows lag T′ + T = −G (…), so each equation with a torque is multiplied by
+lag s + 1.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -9,7 +10,7 @@ from dataclasses import dataclass, replace
 from operator import add
 from typing import Any, NamedTuple
 
-from tmsopt.algebra.kinds import absolute, pi, quotient, sqrt
+from tmsopt.algebra.kinds import absolute, pi, quotient_or_nan, sqrt
 from tmsopt.models.model import (
     Feedback,
     Matrices,
@@ -29,20 +30,21 @@ _STATES = {"phi": "lean", "delta": "steer", "phidot": "lean rate", "deltadot": "
 _TORQUES = {
     "lean": "lean torque, of a rider or a flywheel,",
     "k": "steer torque",
-}  # in the order of the rows of M, D, K
+}
+"""Names of torques → description, in the order of the rows of M, D and K."""
 _STATE_ORDER = ("phi", "phidot", "delta", "deltadot")
 _STEER_GAINS = tuple(f"k_{x}" for x in _STATE_ORDER)
 
 
 class _Gain(NamedTuple):
-    """A gain: torque = −gain · state, or −gain · speed · state if it is a slope over the speed."""
+    """A gain: the torque is −gain · state, or −gain · speed · state if the gain is a slope over the speed."""
 
     torque: str
     state: str
-    slope: bool
+    is_slope: bool
 
     @property
-    def place(self) -> tuple[int, int]:
+    def position(self) -> tuple[int, int]:
         """Row and column in G."""
         return list(_TORQUES).index(self.torque), list(_STATES).index(self.state)
 
@@ -52,8 +54,8 @@ class _Gain(NamedTuple):
 
 
 _GAINS = {
-    f"{torque}_{x}{'_v' * slope}": _Gain(torque, x, slope)
-    for slope in (False, True)
+    f"{torque}_{x}{'_v' * is_slope}": _Gain(torque, x, is_slope)
+    for is_slope in (False, True)
     for torque in ("k", "lean")
     for x in _STATE_ORDER
 }
@@ -86,8 +88,8 @@ class ControllableBicycle:
 
     Attributes:
         model: the bicycle without a controller.
-        matrices: algebraic parameters → M, D, K. The unit of the steer angle is chosen so that they are polynomials.
-        unit: algebraic parameters and √(1 + T²), T = tan λ_s → that unit in radians, and its square.
+        matrices: algebraic parameters → M, D, K. In the unit of the steer angle chosen here, they are polynomials.
+        unit: algebraic parameters and √(1 + T²) with T = tan λ_s → this unit in radians, and its square.
         speed: name of the speed in the native set.
     """
 
@@ -103,15 +105,15 @@ def native_name(name: str) -> str:
 
 
 def si_scale(name: str, p: AnyNumbers, rate: NumberFunction, torque: NumberFunction) -> Any:
-    """The value in SI of a parameter of [feedback] that is 1 in dimensionless form."""
+    """The value in SI of a parameter of [feedback] whose dimensionless value is 1."""
     if name == LAG:
         return 1 / rate(p)
     scale = torque(p) / rate(p) if _GAINS[name].is_rate else torque(p)
-    return scale / sqrt(p["g"] * p["w"]) if _GAINS[name].slope else scale
+    return scale / sqrt(p["g"] * p["w"]) if _GAINS[name].is_slope else scale
 
 
 def feedback_names(names: Iterable[str]) -> tuple[str, ...]:
-    """The names of [feedback] among `names`, SI or dimensionless; with any of them also the four steer torque gains."""
+    """The names of [feedback] in SI for `names`, SI or dimensionless; with any of them, all four steer torque gains."""
     given_names = set(names)
     used_names = {n for n in FEEDBACK if n in given_names or native_name(n) in given_names}
     return tuple(n for n in FEEDBACK if n in used_names or (used_names and n in _STEER_GAINS))
@@ -125,49 +127,49 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
     """
     base, has_lag = bicycle.model, LAG in names
     gains_by_name = {n: _GAINS[n] for n in names if n != LAG}
-    places = {gain.place for gain in gains_by_name.values()}
-    driven = tuple(sorted({row for row, _ in places}))
-    in_si = base.sets[0].rate is not None  # the native set
+    positions = {gain.position for gain in gains_by_name.values()}
+    driven_rows = tuple(sorted({row for row, _ in positions}))
+    is_native_si = base.sets[0].rate is not None  # the native set
 
     def native(name: str) -> str:
-        return name if in_si else native_name(name)
+        return name if is_native_si else native_name(name)
 
     def gains(p: AnyNumbers) -> Matrix:
         """G from native parameters."""
         G: Matrix = [[0] * len(_STATES) for _ in _TORQUES]
         for n, gain in gains_by_name.items():
-            i, j = gain.place
-            G[i][j] = G[i][j] + (p[native(n)] * p[bicycle.speed] if gain.slope else p[native(n)])
+            i, j = gain.position
+            G[i][j] = G[i][j] + (p[native(n)] * p[bicycle.speed] if gain.is_slope else p[native(n)])
         return G
 
     def algebraic(p: AnyNumbers) -> dict[str, Any]:
         base_values, G = base.algebraic(p), gains(p)
-        gain_entries = {f"G_{i}_{j}": G[i][j] for i, j in places}
+        gain_entries = {f"G_{i}_{j}": G[i][j] for i, j in positions}
         lag = {LAG: p[native(LAG)]} if has_lag else {}
         return {**base_values, **gain_entries, "h": sqrt(1 + base_values["T"] * base_values["T"]), **lag}
 
     def polynomial(**values: Any) -> list[Any]:
         matrices = bicycle.matrices(values)
-        angle, square = bicycle.unit(values, values["h"])
-        unit = ((1, angle), (angle, square))
+        unit, unit_squared = bicycle.unit(values, values["h"])
+        gain_units = ((1, unit), (unit, unit_squared))
         rows = [[[P[i][j] for P in matrices] for j in (0, 1)] for i in (0, 1)]
-        for i in driven if has_lag else ():
+        for i in driven_rows if has_lag else ():
             rows[i] = [_multiply_by_lag(values[LAG], entry) for entry in rows[i]]
-        for i, j in places:
+        for i, j in positions:
             entry, power = rows[i][j % 2], -1 - j // 2
-            entry[power] = entry[power] + values[f"G_{i}_{j}"] * unit[i][j % 2]
+            entry[power] = entry[power] + values[f"G_{i}_{j}"] * gain_units[i][j % 2]
         return determinant(rows)
 
     def feedback(p: AnyNumbers) -> Feedback:
         assert base.pencil is not None
-        return Feedback(base.pencil(p)[0], gains(p), p[native(LAG)] if has_lag else None, driven)
+        return Feedback(base.pencil(p)[0], gains(p), p[native(LAG)] if has_lag else None, driven_rows)
 
     def pencil(p: AnyNumbers) -> Matrices:
         assert base.pencil is not None
         M, D, K = base.pencil(p)
         G = gains(p)
         if has_lag:
-            return _first_order(M, D, K, G, p[native(LAG)], driven)
+            return _first_order(M, D, K, G, p[native(LAG)], driven_rows)
         D = [list(map(add, row, g[2:])) for row, g in zip(D, G, strict=True)]
         K = [list(map(add, row, g)) for row, g in zip(K, G, strict=True)]
         return M, D, K
@@ -181,7 +183,7 @@ def add_feedback(bicycle: ControllableBicycle, names: tuple[str, ...]) -> Model:
     return replace(
         base,
         title=f"{base.title} with a controller",
-        degree=4 + len(driven) * has_lag,
+        degree=4 + len(driven_rows) * has_lag,
         sets=sets,
         algebraic=algebraic,
         polynomial=polynomial,
@@ -201,20 +203,20 @@ def _multiply_by_lag(lag: Any, entry: list[Any]) -> list[Any]:
     return [lag * a, a + lag * b, b + lag * c, c]
 
 
-def _first_order(M: Matrix, D: Matrix, K: Matrix, G: Matrix, lag: Any, driven: tuple[int, ...]) -> Matrices:
+def _first_order(M: Matrix, D: Matrix, K: Matrix, G: Matrix, lag: Any, driven_rows: tuple[int, ...]) -> Matrices:
     """I and −A of x′ = A x, where the states x are φ, δ, φ′, δ′ and the delayed torques."""
     (a, b), (c, d) = M
-    size = a * d - b * c
-    inverse = [[quotient(d, size), quotient(-b, size)], [quotient(-c, size), quotient(a, size)]]
+    det_M = a * d - b * c
+    inverse = [[quotient_or_nan(x, det_M) for x in row] for row in ((d, -b), (-c, a))]
     forces = [[*stiff, *damped] for stiff, damped in zip(K, D, strict=True)]
-    zeros = [0] * len(driven)
+    zeros = [0] * len(driven_rows)
     minus_A = [[0, 0, -1, 0, *zeros], [0, 0, 0, -1, *zeros]]
     for first, second in inverse:
         accelerations = [first * x + second * y for x, y in zip(*forces, strict=True)]
-        minus_A.append([*accelerations, *(-(first, second)[row] for row in driven)])
-    for row in driven:
-        decay = (quotient(1, lag) if row == k else 0 for k in driven)
-        minus_A.append([*(quotient(g, lag) for g in G[row]), *decay])
+        minus_A.append([*accelerations, *(-(first, second)[row] for row in driven_rows)])
+    for row in driven_rows:
+        decay = (quotient_or_nan(1, lag) if row == k else 0 for k in driven_rows)
+        minus_A.append([*(quotient_or_nan(g, lag) for g in G[row]), *decay])
     return [[int(i == j) for j in range(len(minus_A))] for i in range(len(minus_A))], minus_A
 
 
@@ -249,18 +251,18 @@ def _unit(name: str) -> str:
     if name == LAG:
         return "s"
     gain = _GAINS[name]
-    return ("N s^2/rad" if gain.is_rate else "N s/rad") if gain.slope else "N m s/rad" if gain.is_rate else "N m/rad"
+    return ("N s^2/rad" if gain.is_rate else "N s/rad") if gain.is_slope else "N m s/rad" if gain.is_rate else "N m/rad"
 
 
 def _parameter(name: str, unit: str, public_name: str) -> Parameter:
     if name == LAG:
         meaning = "time constant of the actuators" + (" per √(w/g)" if unit == "1" else "")
         return Parameter(public_name, unit, meaning, r"\tau", Range(lower=0.0, closed=False))
-    torque, x, slope = _GAINS[name]
-    meaning = f"{_TORQUES[torque]} against the {_STATES[x]}" + (" and the speed" if slope else "")
+    torque, x, is_slope = _GAINS[name]
+    meaning = f"{_TORQUES[torque]} against the {_STATES[x]}" + (" and the speed" if is_slope else "")
     dotted = rf"\dot\{x[:-3]}" if "dot" in x else rf"\{x}"
     symbol = r"\kappa" if public_name != name else "k" if torque == "k" else "l"
-    latex = rf"{symbol}_{{{dotted}{', v' if slope else ''}}}"
+    latex = rf"{symbol}_{{{dotted}{', v' if is_slope else ''}}}"
     return Parameter(public_name, unit, meaning, latex, default=0.0)
 
 
@@ -272,11 +274,11 @@ def _quantities(names: tuple[str, ...], torques: Callable[..., Feedback], rate: 
         return gain * pi(gain) / 180
 
     def torque_after_push(v: AnyNumbers) -> Any:
-        """Torque per impulse: the push changes the rates at once by M⁻¹ (0, 1)."""
+        """Torque divided by the impulse of the push, which changes the rates at once by M⁻¹ (0, 1)."""
         feedback = torques(v)
         (a, b), (c, d) = feedback.mass
         _, gains = feedback.gains
-        return quotient(gains[3] * a - gains[2] * b, a * d - b * c) * rate(v)
+        return quotient_or_nan(gains[3] * a - gains[2] * b, a * d - b * c) * rate(v)
 
     yield _magnitude("torque_per_degree", "N m", "steer torque per degree of lean", r"T_\delta/\phi", per_degree)
     if LAG not in names:

@@ -32,13 +32,13 @@ def quantities(
     computed: Mapping[str, dict[str, Any]] = Table(),
     counterparts: Mapping[str, Quantity] = Table(),
 ) -> tuple[Quantity, ...]:
-    """Quantities by name, each with the fields of `Quantity`; formulas are expressions in parameters and quantities.
+    """Quantities by name, each with the fields of `Quantity`; formulas are expressions of parameters and quantities.
 
     A row with `positive_part` is the positive part of an expression.
 
     Args:
-        computed: name → fields with functions, which a file cannot have.
-        counterparts: SI quantities by name.
+        computed: name → fields that are functions, which a file cannot contain.
+        counterparts: name → quantity in SI.
     """
     result = []
     for name, row in rows.items():

@@ -4,7 +4,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 from tmsopt.algebra.kinds import sqrt, tan
-from tmsopt.models.bicycles.bicycle import WORDS, times
+from tmsopt.models.bicycles.bicycle import WORDS, time_quantities
 from tmsopt.models.bicycles.feedback import FEEDBACK, NO_CONTROLLER, ControllableBicycle, native_name, si_scale
 from tmsopt.models.bicycles.sketches import CONVENTIONS, TMS
 from tmsopt.models.bicycles.tables import parameters, quantities
@@ -31,7 +31,7 @@ _NATIVE = ParameterSet("dimensionless", parameters(_TABLES["parameters"]["dimens
 
 
 def from_si(p: AnyNumbers) -> dict[str, Any]:
-    """Dimensionless parameters for SI values (m, m/s, m/s², rad, kg), any numbers.
+    """Dimensionless parameters for SI values (m, m/s, m/s², rad, kg), which are numbers of any kind.
 
     Example:
         >>> own = dict(w=1.0, v=3.0, g=9.0, lambda_s=0.1, m_H=1.0, m_B=10.0, x_B=1.2, x_H=1.0, z_B=-0.4, z_H=-0.2)
@@ -52,7 +52,7 @@ def from_si(p: AnyNumbers) -> dict[str, Any]:
 
 
 def to_si(p: AnyNumbers, w: Any = 1.0, m_B: Any = 1.0, g: Any = GRAVITY) -> dict[str, Any]:
-    """SI values for dimensionless parameters, given wheelbase w (m), rear frame mass m_B (kg) and g (m/s²).
+    """SI values for dimensionless parameters, with the wheelbase w (m), the rear frame mass m_B (kg) and g (m/s²).
 
     Gains of a controller are converted too.
 
@@ -87,12 +87,12 @@ def _pencil(p: AnyNumbers) -> Matrices:
 
 
 def _rate(p: AnyNumbers) -> Any:
-    """A rate of 1 in 1/s, √(g/w)."""
+    """The unit of rates in 1/s, √(g/w)."""
     return sqrt(p["g"] / p["w"])
 
 
 def _torque(p: AnyNumbers) -> Any:
-    """A torque of 1 in N m."""
+    """The unit of torques in N m."""
     return p["m_B"] * p["g"] * p["w"]
 
 
@@ -101,7 +101,7 @@ _SI = ParameterSet(
     "SI",
     parameters(_TABLES["parameters"]["SI"]),
     native=from_si,
-    quantities=(*_SI_QUANTITIES, *times(_rate, "sqrt(g/w)")),
+    quantities=(*_SI_QUANTITIES, *time_quantities(_rate, "sqrt(g/w)")),
     rate=_rate,
     root_unit="√(g/w)",
     torque=_torque,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from tmsopt.algebra.kinds import absolute, choose, negligible, quotient, sqrt, tan
+from tmsopt.algebra.kinds import absolute, choose, negligible, quotient_or_nan, sqrt, tan
 from tmsopt.models.bicycles.bicycle import omega0, omega0_equation, smaller_eigenvalue
 from tmsopt.models.bicycles.tms_equations import matrices
 from tmsopt.records import AnyNumbers
@@ -29,7 +29,7 @@ def _Fr_c(v: AnyNumbers) -> Any:
     terms, denominator = _weave_condition(v)
     numerator, size = sum(terms), sum(map(absolute, terms))
     is_same_place = negligible(v["chi_B"] - v["chi_H"], absolute(v["chi_B"]) + absolute(v["chi_H"]))
-    square = quotient(choose(negligible(numerator, size), 0, numerator), choose(is_same_place, 0, denominator))
+    square = quotient_or_nan(choose(negligible(numerator, size), 0, numerator), choose(is_same_place, 0, denominator))
     return absolute(sqrt(square))  # turns −0 into 0
 
 
@@ -43,9 +43,9 @@ def _mass_margin(v: AnyNumbers) -> Any:
     T = tan(v["lambda_s"])
     h = sqrt(1 + T * T)
     native = {name: v[name] for name in ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H")}
-    (first, mixed), (_, second) = matrices(**native, sine=T / h, cosine=1 / h)[0]
+    (M11, M12), (_, M22) = matrices(**native, sine=T / h, cosine=1 / h)[0]
     determinant = v["mu"] * v["nu_H"] * v["nu_H"] * v["zeta_B"] * v["zeta_B"]
-    return smaller_eigenvalue(first, mixed, second, determinant)
+    return smaller_eigenvalue(M11, M12, M22, determinant)
 
 
 COMPUTED: Mapping[str, dict[str, Any]] = {

@@ -7,7 +7,7 @@ with the same parameters and roots.
 from pkgutil import resolve_name
 from typing import Any
 
-from tmsopt.models.bicycles.bicycle import WORDS, times
+from tmsopt.models.bicycles.bicycle import WORDS, time_quantities
 from tmsopt.models.bicycles.feedback import NO_CONTROLLER, ControllableBicycle
 from tmsopt.models.bicycles.sketches import CONVENTIONS, WHIPPLE
 from tmsopt.models.bicycles.tables import parameters, quantities
@@ -24,7 +24,7 @@ _SI = ParameterSet(
     "SI",
     parameters(_TABLES["parameters"]),
     native=dict,
-    quantities=(*quantities(_TABLES["quantities"], COMPUTED), *times(lambda p: 1, "1")),
+    quantities=(*quantities(_TABLES["quantities"], COMPUTED), *time_quantities(lambda p: 1, "1")),
     rate=lambda p: 1,
     root_unit="1/s",
     torque=lambda p: 1,

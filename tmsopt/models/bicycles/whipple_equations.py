@@ -55,7 +55,8 @@ def matrices(
     I_Txz = I_Bxz + I_Hxz - m_B * x_B * z_B - m_H * x_H * z_H + m_F * w * r_F
     I_Tzz = I_Rxx + I_Bzz + I_Hzz + I_Fxx + m_B * x_B * x_B + m_H * x_H * x_H + m_F * w * w
 
-    # Sums of the front assembly about the steer axis. The axis meets the ground at the distance c ahead of the contact.
+    # Sums of the front assembly about the steer axis. The axis meets the ground at the distance c ahead of the
+    # front contact.
     u_H = (x_H - w - c) * cosine - z_H * sine
     u_F = r_F * sine - c * cosine
     first_u = m_H * u_H + m_F * u_F
@@ -65,7 +66,7 @@ def matrices(
     I_Alx = m_F * u_F * r_F - m_H * u_H * z_H + about_x
     I_Alz = m_H * u_H * x_H + m_F * u_F * w + about_z
 
-    yaw = c * turn  # of the rear frame, per steer angle
+    yaw = c * turn  # yaw angle of the rear frame for a steer angle of 1
     S_A = first_u + yaw * first_x
     S_T = S_R + S_F
     spin = yaw * S_T + S_F * cosine

@@ -5,20 +5,20 @@ from collections.abc import Mapping
 from inspect import signature
 from typing import Any
 
-from tmsopt.algebra.kinds import both, choose, least, less, quotient, ratio, sqrt, tan
+from tmsopt.algebra.kinds import choose, less, logical_and, minimum, quotient_or_nan, quotient_or_zero, sqrt, tan
 from tmsopt.models.bicycles.bicycle import omega0, omega0_equation, smaller_eigenvalue
 from tmsopt.models.bicycles.whipple_equations import matrices, powers_of_speed, tangent_matrices
 from tmsopt.models.model import Matrix
 from tmsopt.records import AnyNumbers
 
-_LARGE = 1e300  # stands for "no root"; greater than every v²/g of interest
+_LARGE = 1e300  # means "no root"; it is greater than every v²/g that matters
 
 IN_MATRICES = tuple(signature(matrices).parameters)[:-3]
 """Algebraic parameters except T, v and g: lengths, masses, inertias and spins."""
 
 
 def spin(I_yy: Any, r: Any) -> Any:
-    """Angular momentum I_yy/r of a rolling wheel at a speed of 1; 0 for a wheel without inertia and any radius.
+    """Angular momentum I_yy/r of a rolling wheel at a speed of 1; 0 for a wheel without inertia, whatever its radius.
 
     I_yy ≤ m r², so the spin vanishes with the radius. A wheel with inertia but without radius would turn infinitely
     fast, so its spin is nan.
@@ -29,7 +29,7 @@ def spin(I_yy: Any, r: Any) -> Any:
 
     More: docs/how_to/import.md
     """
-    return ratio(I_yy, r)
+    return quotient_or_zero(I_yy, r)
 
 
 def algebraic(p: AnyNumbers) -> dict[str, Any]:
@@ -70,7 +70,7 @@ def _powers(v: AnyNumbers) -> tuple[Any, ...]:
 
 def _v_capsize(v: AnyNumbers) -> Any:
     b = _powers(v)
-    return sqrt(v["g"] * quotient(-b[6], b[7]))
+    return sqrt(v["g"] * quotient_or_nan(-b[6], b[7]))
 
 
 def _v_capsize_equation(v: AnyNumbers, x: Any) -> Any:
@@ -92,16 +92,19 @@ def _v_weave(v: AnyNumbers) -> Any:
 
 
 def _quadratic_roots(a: Any, b: Any, c: Any) -> tuple[Any, Any]:
-    """Roots of a y² + b y + c, without loss of digits; nan for a root that does not exist. For a = 0, one exists."""
+    """Roots of a y² + b y + c, without loss of digits; nan for a root that does not exist. For a = 0 there is one."""
     radical = sqrt(b * b - 4 * a * c)
     half_sum = -(b + choose(less(0, b), radical, -radical)) / 2
-    return quotient(half_sum, a), quotient(c, half_sum)
+    return quotient_or_nan(half_sum, a), quotient_or_nan(c, half_sum)
 
 
-def _least_weave(first: Any, second: Any, b: tuple[Any, ...]) -> Any:
-    """The smaller of two roots y, of those that are positive and give a positive ω²; nan if there is none."""
-    first, second = (choose(both(less(0, y), less(0, (b[4] + y * b[5]) * b[1])), y, _LARGE) for y in (first, second))
-    smaller_root = least(first, second)
+def _least_weave(y1: Any, y2: Any, b: tuple[Any, ...]) -> Any:
+    """The smaller of the roots y that are positive and give a positive ω²; nan if neither root does."""
+
+    def large_unless_weave(y: Any) -> Any:
+        return choose(logical_and(less(0, y), less(0, (b[4] + y * b[5]) * b[1])), y, _LARGE)
+
+    smaller_root = minimum(large_unless_weave(y1), large_unless_weave(y2))
     return choose(less(smaller_root, _LARGE), smaller_root, math.nan)
 
 
@@ -117,8 +120,8 @@ def _u_H(v: AnyNumbers) -> Any:
 
 def _mass_margin(v: AnyNumbers) -> Any:
     """The smaller eigenvalue of M."""
-    (first, mixed), (_, second) = canonical(v)[0]
-    return smaller_eigenvalue(first, mixed, second, first * second - mixed * mixed)
+    (M11, M12), (_, M22) = canonical(v)[0]
+    return smaller_eigenvalue(M11, M12, M22, M11 * M22 - M12 * M12)
 
 
 COMPUTED: Mapping[str, dict[str, Any]] = {
@@ -128,7 +131,7 @@ COMPUTED: Mapping[str, dict[str, Any]] = {
     "mechanical_trail": {"value": lambda v: v["c"] * _sine_cosine(v)[1]},
     "fork_offset": {"value": _fork_offset},
     "u_H": {"value": _u_H},
-    "u_A": {"value": lambda v: quotient(v["m_H"] * v["u_H"] + v["m_F"] * v["fork_offset"], v["m_H"] + v["m_F"])},
+    "u_A": {"value": lambda v: quotient_or_nan(v["m_H"] * v["u_H"] + v["m_F"] * v["fork_offset"], v["m_H"] + v["m_F"])},
     "S_R": {"value": lambda v: spin(v["I_Ryy"], v["r_R"])},
     "S_F": {"value": lambda v: spin(v["I_Fyy"], v["r_F"])},
     "mass_margin": {"value": _mass_margin},

@@ -1,4 +1,4 @@
-"""A system of the user's own with a controller u = −G y, y = C x, in M q″ + D q′ + K q = B u or x′ = A x + B u."""
+"""Adds a controller u = −G y, y = C x to a system of the user's own: M q″ + D q′ + K q = B u or x′ = A x + B u."""
 
 from collections.abc import Mapping
 
@@ -7,7 +7,7 @@ import numpy as np
 from tmsopt.models.model import Matrix
 from tmsopt.models.stated.texts import Unfit
 
-LOOP = ("B", "C", "G")
+LOOP_KEYS = ("B", "C", "G")
 """Keys of the controller's matrices."""
 
 
@@ -15,12 +15,12 @@ def check_loop(shapes: Mapping[str, tuple[int, int]]) -> None:
     """Check that the matrices of a controller fit each other and the system.
 
     Args:
-        shapes: rows and columns of every given matrix.
+        shapes: key of each given matrix → its numbers of rows and columns.
 
     Raises:
         Unfit: if a matrix is missing or has another size.
     """
-    if shapes.keys().isdisjoint(LOOP):
+    if shapes.keys().isdisjoint(LOOP_KEYS):
         return
     for key in ("B", "G"):
         if key not in shapes:
@@ -33,8 +33,8 @@ def check_loop(shapes: Mapping[str, tuple[int, int]]) -> None:
         raise Unfit("B", f"has {rows} rows; accepted: {n}, as many as {system}")
     measured, columns = shapes.get("C", (states, states))
     if columns != states:
-        what = "one per state" if system == "A" else "the coordinates, then their rates"
-        raise Unfit("C", f"has {columns} columns; accepted: {states}, {what}")
+        meaning = "one per state" if system == "A" else "the coordinates, then their rates"
+        raise Unfit("C", f"has {columns} columns; accepted: {states}, {meaning}")
     if shapes["G"] != (inputs, measured):
         size = " × ".join(map(str, shapes["G"]))
         raise Unfit(
@@ -46,7 +46,7 @@ def check_loop(shapes: Mapping[str, tuple[int, int]]) -> None:
 
 def close_loop(matrices: Mapping[str, Matrix]) -> dict[str, Matrix]:
     """The matrices of the system with its controller: B G C is added to K and D, or subtracted from A."""
-    system = {key: rows for key, rows in matrices.items() if key not in LOOP}
+    system = {key: rows for key, rows in matrices.items() if key not in LOOP_KEYS}
     if "B" not in matrices:
         return system
     B, G, C = (np.array(matrices.get(key, 0), dtype=object) for key in ("B", "G", "C"))

@@ -1,4 +1,4 @@
-"""Degrees of expressions. They are checked before the exact values, whose numbers of digits grow with the degree."""
+"""Degrees of expressions. They are checked before exact values are computed, whose digits grow with the degree."""
 
 import math
 import operator
@@ -15,7 +15,7 @@ LARGEST_EXPONENT = 1023
 """Largest exponent of a power: 2**1024 is not a double."""
 
 LARGEST_DEGREE = 10_000
-"""Largest degree of an expanded expression, so that its exact value for doubles has at most some million bits."""
+"""Largest degree of an expression that is multiplied out. Its exact value for doubles has at most some million bits."""
 
 
 class DegreeTooHigh(ValueError):
@@ -34,7 +34,7 @@ class Degree:
 
     Attributes:
         numerator, denominator: upper bounds of the degrees of the two polynomials.
-        number: the value of a constant expression.
+        number: the value of a constant expression; None for other expressions.
 
     Raises:
         DegreeTooHigh: if a number is not finite, or an exponent or a degree is too large.
@@ -80,7 +80,12 @@ class Degree:
 
 
 def _operation(join: Callable[..., Degree], name: str) -> Callable[..., Degree]:
-    """An operation on degrees; if all operands are numbers, its result also contains the number."""
+    """An operation on degrees. If all operands have a `number`, the result has one, too.
+
+    Args:
+        join: function that joins the degrees.
+        name: operation that computes the number.
+    """
 
     def operation(*operands: Degree) -> Degree:
         joined = join(*operands)
@@ -104,9 +109,8 @@ _OPERATIONS: Mapping[str, Callable[..., Degree]] = {
         ("neg", "sqrt", "abs", "min", "max"),
         lambda *operands: Degree(max(x.numerator for x in operands), max(x.denominator for x in operands)),
     ),
-    **dict.fromkeys(
-        ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan"), lambda *operands: Degree()
-    ),  # their values have a fixed number of digits
+    # Values of these functions have a fixed number of digits.
+    **dict.fromkeys(("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan"), lambda *operands: Degree()),
 }
 
 

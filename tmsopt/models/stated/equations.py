@@ -1,4 +1,4 @@
-"""Characteristic polynomial and matrix polynomial of a system with nodes as entries."""
+"""Characteristic polynomial and matrix polynomial of a system whose entries are nodes (parts of formulas)."""
 
 from collections.abc import Iterable
 from fractions import Fraction
@@ -10,7 +10,7 @@ from tmsopt.models.model import Matrices, Matrix
 from tmsopt.models.stated.pairs import Pair, pair
 from tmsopt.roots.polynomial import characteristic_polynomial, product, quadratic_pencil
 
-IMAGINARY = "H, imaginary part"
+IMAGINARY_KEY = "H, imaginary part"
 """Key of the imaginary part of a complex H; the key ``H`` then has the real part."""
 
 
@@ -20,16 +20,25 @@ def user_key(key: str) -> str:
 
 
 def sort_places(kind: str, places: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Places of entries in the user's order: both parts of an entry of H one after the other."""
-    return sorted(places, key=lambda at: (at[0] == "quantities", at[1])) if kind == "hamiltonian" else list(places)
+    """Sort places, each a key and a position, in the user's order: the two parts of an entry of H stay together."""
+    return (
+        sorted(places, key=lambda place: (place[0] == "quantities", place[1]))
+        if kind == "hamiltonian"
+        else list(places)
+    )
 
 
 def polynomial(kind: str, blocks: dict[str, Matrix], carrier: float = 0.0) -> list[Any]:
-    """Coefficients of the characteristic polynomial, descending."""
+    """Coefficients of the characteristic polynomial, descending.
+
+    Args:
+        blocks: key → matrix.
+        carrier: real constant that is added to the eigenfrequencies of H.
+    """
     if kind == "coefficients":
         return blocks["coefficients"][0]
     if kind == "hamiltonian":
-        return _real_polynomial(blocks["H"], blocks[IMAGINARY], carrier)
+        return _real_polynomial(blocks["H"], blocks[IMAGINARY_KEY], carrier)
     if "A" in blocks:
         return characteristic_polynomial(blocks["A"])
     return quadratic_pencil(*pencil(blocks))
@@ -49,9 +58,9 @@ def _add_carrier(R: Matrix, carrier: float) -> Matrix:
 
 
 def pencil(blocks: dict[str, Matrix], carrier: float = 0.0) -> Matrices:
-    """Matrices of the matrix polynomial with these roots, in descending powers; for H those of the real system."""
+    """Matrices of the matrix polynomial, for descending powers; for H they belong to the real system with a carrier."""
     if "H" in blocks:
-        R, J = blocks["H"], blocks[IMAGINARY]
+        R, J = blocks["H"], blocks[IMAGINARY_KEY]
         S = _add_carrier(R, carrier)
         A = [[*j, *r] for j, r in zip(J, S, strict=True)] + [[*(-x for x in r), *j] for j, r in zip(J, S, strict=True)]
     elif "A" in blocks:

@@ -23,7 +23,7 @@ _REPLACED = re.compile(rf"\(([^()*]+)\*{UNIT}\)")
 
 @dataclass(frozen=True)
 class Pair:
-    """re + i im; the imaginary part of a real number is the int 0."""
+    """The complex number re + i im. The imaginary part of a real number is the int 0."""
 
     re: Any
     im: Any = 0
@@ -51,8 +51,8 @@ class Pair:
         b = pair(other)
         if is_real(b):
             return Pair(self.re / b.re, self.im if is_real(self) else self.im / b.re)
-        top, square = self * Pair(b.re, -b.im), b.re * b.re + b.im * b.im
-        return Pair(top.re / square, top.im / square)
+        numerator, denominator = self * Pair(b.re, -b.im), b.re * b.re + b.im * b.im
+        return Pair(numerator.re / denominator, numerator.im / denominator)
 
     def __pow__(self, other: Any) -> "Pair":
         n = pair(other)
@@ -61,10 +61,10 @@ class Pair:
         exponent = _whole_exponent(n)
         if exponent is None:
             raise DegreeTooHigh("raises a complex number to a power; accepted: whole exponents, and exp(1j*phi)")
-        found, power = Pair(constant(1)), self
+        result, power = Pair(constant(1)), self
         for bit in bin(abs(exponent))[:1:-1]:
-            found, power = (found * power if bit == "1" else found), power * power
-        return Pair(constant(1)) / found if exponent < 0 else found
+            result, power = (result * power if bit == "1" else result), power * power
+        return Pair(constant(1)) / result if exponent < 0 else result
 
     __radd__ = __add__
     __rmul__ = __mul__
@@ -78,7 +78,7 @@ def pair(x: Any) -> Pair:
 
 
 def entry_pair(x: Any) -> Pair:
-    """An entry of a complex matrix as a pair, its numbers and expressions unchanged."""
+    """An entry of a complex matrix as a pair. Its numbers and expressions stay unchanged."""
     if isinstance(x, tuple):
         return Pair(*x[:2])
     if isinstance(x, complex | np.complexfloating):
@@ -95,11 +95,11 @@ def _whole_exponent(n: Pair) -> int | None:
     if not is_real(n):
         return None
     value = constant(n.re).fraction
-    known = value is not None and value.denominator == 1 and abs(value) <= LARGEST_EXPONENT
-    return int(value) if value is not None and known else None
+    is_whole = value is not None and value.denominator == 1 and abs(value) <= LARGEST_EXPONENT
+    return int(value) if value is not None and is_whole else None
 
 
-def _real(name: str) -> Callable[..., Pair]:
+def _real_function(name: str) -> Callable[..., Pair]:
     def operate(*operands: Pair) -> Pair:
         if not all(map(is_real, operands)):
             raise DegreeTooHigh(f"takes {name} of a complex number; accepted for complex numbers: + - * / ** and exp")
@@ -115,7 +115,7 @@ def _exp(x: Pair) -> Pair:
 
 PAIRS = Kind(
     {
-        **{name: _real(name) for name in FUNCTIONS},
+        **{name: _real_function(name) for name in FUNCTIONS},
         **{name: getattr(operator, name) for name in ("add", "sub", "mul", "neg", "pow")},
         "div": operator.truediv,
         "square": lambda x: x * x,
@@ -129,7 +129,7 @@ IMAGINARY_UNIT: AnyNumbers = {UNIT: Pair(constant(0), constant(1))}
 
 
 def replace_literals(text: str) -> str:
-    """The text with a name in numbers such as 2.5j, which become ``(2.5*_1j)``."""
+    """The text in which a number such as 2.5j becomes ``(2.5*_1j)``, with a name for the imaginary unit."""
     return _LITERAL.sub(rf"(\1*{UNIT})", text)
 
 
@@ -139,5 +139,5 @@ def complex_text(re: str, im: str) -> str:
 
 
 def restore_literals(message: str) -> str:
-    """The message with the user's notation, such as 2.5j, in place of the names."""
+    """The message in which ``(2.5*_1j)`` becomes 2.5j again, as the user wrote it."""
     return _REPLACED.sub(r"\1j", message)

@@ -1,4 +1,7 @@
-"""A complex system as a real one of twice the size; a carrier separates its roots from the conjugates of others."""
+"""A complex system as a real system of twice the size.
+
+A carrier, a real constant, is added to all eigenfrequencies, so that no root meets the conjugate of another root.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -14,17 +17,18 @@ from tmsopt.algebra.kinds import values
 from tmsopt.models.model import Matrix, Model
 from tmsopt.records import AnyNumbers, Array
 
-_ROOM = 16
-"""A carrier serves other ranges too, while no root is farther from the axis than this many times the spread."""
+# The spread is the largest distance of Re ω from the middle of all Re ω, and at least the largest |Im ω|.
 
-_NEGLIGIBLE = 2.0**-300  # a smaller spread is rounding of intervals around 0, and its carrier would underflow
-_LEAST_SPREAD = 1e-6  # of the largest frequency: least spread; a smaller one is not worth its digits
-_SAMPLE = 256  # designs of a sample
-_LEAST_DISTANCE = 0.9  # of the spread: least distance of the roots from the axis
-_WIDER = 2.0  # factor on ranges that a sample shows
-_SAMPLE_FACTOR, _LEAST_PART = 1.25, 1 / 64  # factor on the spread in a sample; least part of the proven spread
-_CORNERS = 8  # most parameters for a sample with all corners of the box
-_PARTS = 32  # a carrier is a multiple of such a part of its size, so that similar ranges share it
+_MAX_DISTANCE = 16  # a carrier is used for other ranges, too, if no root is farther from the axis than so many spreads
+_MIN_DISTANCE = 0.9  # least distance of the roots from the axis, in spreads
+_NEGLIGIBLE = 2.0**-300  # a smaller spread comes from rounding, and its carrier would underflow
+_MIN_SPREAD = 1e-6  # least spread, relative to the largest frequency; a smaller one would not save digits
+_SAMPLE_SIZE = 256  # designs of a sample of the ranges
+_WIDENING = 2.0  # a range of values in a sample is widened by this factor
+_SPREAD_FACTOR = 1.25  # the spread in a sample is multiplied by this factor
+_MIN_SHARE = 1 / 64  # least spread from a sample, relative to the proven spread
+_MAX_CORNER_PARAMETERS = 8  # with more parameters, a sample does not contain the corners of the ranges
+_STEPS = 32  # a carrier is a multiple of its size divided by this, so that similar ranges have the same carrier
 
 WORDS = ("threshold", "zero frequency")
 
@@ -45,7 +49,7 @@ CONVENTIONS = (
 
 
 def complex_model(
-    real: Model,
+    real_model: Model,
     carrier: float,
     bounds: Callable[[Mapping[str, Interval]], tuple[float, float]],
     with_carrier: Callable[[float], Model],
@@ -55,20 +59,20 @@ def complex_model(
 
     Args:
         real: the model of the real system with the carrier.
-        bounds: ranges of parameters → middle and spread of the eigenfrequencies.
-        with_carrier: carrier → the model of H.
+        bounds: function from ranges of parameters to the middle and the spread of the eigenfrequencies.
+        with_carrier: function from a carrier to the model of H with this carrier.
         double: pencil of the real system without a carrier.
     """
 
     def choose_carrier(box: Mapping[str, Interval]) -> Model:
         middle, spread = bounds(box)
-        least, most = middle + carrier - spread, middle + carrier + spread
-        if carrier and least >= _LEAST_DISTANCE * spread and most <= _ROOM * spread:
+        lowest, highest = middle + carrier - spread, middle + carrier + spread
+        if carrier and lowest >= _MIN_DISTANCE * spread and highest <= _MAX_DISTANCE * spread:
             return model
         return with_carrier(carrier_for(middle, spread))
 
     model = replace(
-        real,
+        real_model,
         carrier=carrier,
         carried=choose_carrier,
         double=double,
@@ -80,80 +84,86 @@ def complex_model(
 
 
 def carrier_for(middle: float, spread: float) -> float:
-    """The carrier that moves eigenfrequencies within `spread` of `middle` to about twice the spread from 0, or more."""
+    """The carrier for eigenfrequencies within `spread` of `middle`; their middle moves to 2 to 4 times the spread."""
     distance = 2.0 ** math.ceil(math.log2(2 * spread))
-    step = distance / _PARTS
+    step = distance / _STEPS
     return distance - step * round(middle / step)
 
 
 def frequency_bounds(entries: Sequence[Node]) -> Callable[[Mapping[str, Interval]], tuple[float, float]]:
     """A function from parameter ranges to the middle and the spread of Re ω; the spread is at least max |Im ω|.
 
-    Re ω and Im ω lie in the ranges of the eigenvalues of (H + H*)/2 and (H − H*)/2i, which Gershgorin's discs bound, by
-    intervals or, where these have no bound as for 1/x, by a sample. The discs may be far too wide, and a large carrier
-    costs digits, so a sample shows the actual spread. Roots meet conjugates of others only beyond twice that.
+    Re ω and Im ω lie in the ranges of the eigenvalues of (H + H*)/2 and (H − H*)/2i. Gershgorin's discs bound these
+    eigenvalues. Intervals bound the entries, or a sample if intervals give no bound, as for 1/x. The discs may be far
+    too wide, and a large carrier costs digits, so the eigenvalues at a sample of designs show the actual spread. This
+    is safe: a root meets the conjugate of another root only if the true spread is more than twice as large.
     """
     n = math.isqrt(len(entries) // 2)
     R, J = (np.array(part, dtype=object).reshape(n, n) for part in (entries[: n * n], entries[n * n :]))
-    off = ~np.eye(n, dtype=bool)
-    off_diagonal = [x for P in (R + R.T, J - J.T, J + J.T, R - R.T) for x in (P / 2)[off]]
-    every = [*R.diagonal(), *J.diagonal(), *off_diagonal]
+    is_off_diagonal = ~np.eye(n, dtype=bool)
+    off_diagonal = [x for P in (R + R.T, J - J.T, J + J.T, R - R.T) for x in (P / 2)[is_off_diagonal]]
     matrix = formula(entries)
-    names, bounded = matrix.names, formula(every, matrix.names)
+    disc_parts = formula([*R.diagonal(), *J.diagonal(), *off_diagonal], matrix.names)
 
     def bounds(box: Mapping[str, Interval]) -> tuple[float, float]:
-        own_box = [box[name] for name in names]
-        found = np.array(_ranges(bounded, own_box))
-        discs = np.split(np.abs(found[2 * n :]).max(axis=1), 4) if off_diagonal else [np.zeros(0)] * 4
+        intervals = [box[name] for name in matrix.names]
+        part_ranges = np.array(_bound_outputs(disc_parts, intervals))
+        sizes = np.split(np.abs(part_ranges[2 * n :]).max(axis=1), 4) if off_diagonal else [np.zeros(0)] * 4
         ends = []
-        for diagonal, re, im in ((found[:n], *discs[:2]), (found[n : 2 * n], *discs[2:])):
-            reach = np.hypot(re, im).reshape(n, -1).sum(axis=1)
-            ends.append(((diagonal[:, 0] - reach).min(), (diagonal[:, 1] + reach).max()))
+        for diagonal, re, im in ((part_ranges[:n], *sizes[:2]), (part_ranges[n : 2 * n], *sizes[2:])):
+            radius = np.hypot(re, im).reshape(n, -1).sum(axis=1)
+            ends.append(((diagonal[:, 0] - radius).min(), (diagonal[:, 1] + radius).max()))
         (low, high), loss = ends[0], np.abs(ends[1]).max()
         spread = float(max((high - low) / 2, loss))
-        sample = _frequencies(matrix, n, own_box) if any(lo < hi for lo, hi in own_box) else np.zeros(0)
+        sample = _sample_frequencies(matrix, n, intervals) if any(lo < hi for lo, hi in intervals) else np.zeros(0)
         if sample.size:
-            least, most = sample.real.min(), sample.real.max()
-            own = _SAMPLE_FACTOR * max((most - least) / 2, np.abs(sample.imag).max())
-            if own < spread:
-                low, high, spread = least, most, float(max(own, _LEAST_PART * spread))
-        spread = max(spread, _LEAST_SPREAD * max(abs(low), abs(high)))  # the spread of equal entries would be rounding
+            sample_low, sample_high = sample.real.min(), sample.real.max()
+            sample_spread = _SPREAD_FACTOR * max((sample_high - sample_low) / 2, np.abs(sample.imag).max())
+            if sample_spread < spread:
+                low, high, spread = sample_low, sample_high, float(max(sample_spread, _MIN_SHARE * spread))
+        spread = max(spread, _MIN_SPREAD * max(abs(low), abs(high)))  # equal entries have a spread from rounding only
         return float(low + high) / 2, spread if spread > _NEGLIGIBLE else 1.0
 
     return bounds
 
 
-def _frequencies(matrix: Formula, n: int, box: Sequence[Interval]) -> Any:
-    """Eigenvalues of H at a sample of the box, with its corners if they are few; empty if H is not finite there."""
-    share = _unit_points(len(box))
-    if len(box) <= _CORNERS:
-        share = np.concatenate([share, np.array(list(product((0.0, 1.0), repeat=len(box))))])
-    own = _evaluate(matrix, box, share)
-    H = (own[: n * n] + 1j * own[n * n :]).T.reshape(-1, n, n)
+def _sample_frequencies(matrix: Formula, n: int, box: Sequence[Interval]) -> Any:
+    """Eigenvalues of H at designs in a box, with its corners if they are few; empty if H is not finite there."""
+    points = _unit_points(len(box))
+    if len(box) <= _MAX_CORNER_PARAMETERS:
+        points = np.concatenate([points, np.array(list(product((0.0, 1.0), repeat=len(box))))])
+    entries = _evaluate(matrix, box, points)
+    H = (entries[: n * n] + 1j * entries[n * n :]).T.reshape(-1, n, n)
     return np.linalg.eigvals(H) if np.isfinite(H).all() else np.zeros(0)
 
 
-def _evaluate(asked: Formula, box: Sequence[Interval], share: Array) -> Array:
-    """Values of a formula at designs of a box: a row for each output, a column for each design."""
-    columns = {name: lo + (hi - lo) * at for name, (lo, hi), at in zip(asked.names, box, share.T, strict=True)}
-    return np.array([np.broadcast_to(np.asarray(x, dtype=float), len(share)) for x in values(asked, columns)])
+def _evaluate(outputs: Formula, box: Sequence[Interval], points: Array) -> Array:
+    """Values of a formula at designs of a box: a row for each output, a column for each design.
+
+    Args:
+        points: a row for each design, with coordinates from 0 to 1 in the box.
+    """
+    columns = {name: lo + (hi - lo) * x for name, (lo, hi), x in zip(outputs.names, box, points.T, strict=True)}
+    return np.array([np.broadcast_to(np.asarray(x, dtype=float), len(points)) for x in values(outputs, columns)])
 
 
 def _unit_points(size: int) -> Array:
     """Evenly spread points of the unit cube."""
-    share = np.modf(np.outer(np.arange(_SAMPLE), 1 / np.sqrt([2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41])))[0]
-    return np.asarray(share[:, np.arange(size) % share.shape[1]])
+    steps = 1 / np.sqrt([2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41])
+    points = np.modf(np.outer(np.arange(_SAMPLE_SIZE), steps))[0]
+    return np.asarray(points[:, np.arange(size) % len(steps)])
 
 
-def _ranges(asked: Formula, box: Sequence[Interval]) -> list[Interval]:
+def _bound_outputs(outputs: Formula, box: Sequence[Interval]) -> list[Interval]:
+    """Ranges of the outputs of a formula over a box, by intervals, or else by a sample."""
     try:
-        found = ranges(asked, box)
-        if all(math.isfinite(x) for ends in found for x in ends):
-            return found
+        proven_ranges = ranges(outputs, box)
+        if all(math.isfinite(x) for ends in proven_ranges for x in ends):
+            return proven_ranges
     except UnsupportedOperation:
         pass
-    own = _evaluate(asked, box, _unit_points(len(box)))
-    own = np.where(np.isfinite(own), own, 0.0)
-    low, high = own.min(axis=1), own.max(axis=1)
-    size = (_WIDER - 1) * np.maximum(high - low, 0.0) / 2
-    return list(zip((low - size).tolist(), (high + size).tolist(), strict=True))
+    sample = _evaluate(outputs, box, _unit_points(len(box)))
+    sample = np.where(np.isfinite(sample), sample, 0.0)
+    low, high = sample.min(axis=1), sample.max(axis=1)
+    margin = (_WIDENING - 1) * np.maximum(high - low, 0.0) / 2
+    return list(zip((low - margin).tolist(), (high + margin).tolist(), strict=True))

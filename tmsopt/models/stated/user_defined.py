@@ -30,22 +30,22 @@ from tmsopt.errors import short
 from tmsopt.models.built_in import MODELS
 from tmsopt.models.model import Matrices, Matrix, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.names import latex, name_fault, number_text, spell_formula
-from tmsopt.models.stated.closed_loop import LOOP, check_loop, close_loop
+from tmsopt.models.stated.closed_loop import LOOP_KEYS, check_loop, close_loop
 from tmsopt.models.stated.degree import first_fault
-from tmsopt.models.stated.equations import IMAGINARY, pencil, polynomial, sort_places, user_key
+from tmsopt.models.stated.equations import IMAGINARY_KEY, pencil, polynomial, sort_places, user_key
 from tmsopt.models.stated.pairs import complex_text
 from tmsopt.models.stated.real_form import complex_model, frequency_bounds
-from tmsopt.models.stated.texts import Unfit, parse_entries, place
+from tmsopt.models.stated.texts import Unfit, describe_position, parse_entries
 from tmsopt.records import AnyNumbers
 
-_ACCEPTED = "accepted: finite numbers, expressions in quotes, and SX expressions"
-_FINITE = "accepted: finite numbers, and expressions of them"
+_ACCEPTED_ENTRIES = "accepted: finite numbers, expressions in quotes, and SX expressions"
+_ACCEPTED_NUMBERS = "accepted: finite numbers, and expressions of them"
 
-_MAX_SIZE = dict.fromkeys("MDKH", 6) | dict.fromkeys(("A", "coefficients", *LOOP), 12)
+_MAX_SIZE = dict.fromkeys("MDKH", 6) | dict.fromkeys(("A", "coefficients", *LOOP_KEYS), 12)
 """Key → largest number of rows and columns of a matrix; for coefficients, largest degree."""
 
-_Shape = tuple[str, int, int]  # key, rows and columns of a matrix
-_SAMPLES = 24  # designs at which a leading coefficient must be 0 before it is examined exactly
+_Shape = tuple[str, int, int]  # key, number of rows and number of columns of a matrix
+_SAMPLES = 24  # a coefficient that is 0 at so many designs is then tested exactly
 
 
 def from_matrices(
@@ -101,7 +101,7 @@ def from_matrices(
 
 
 def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: AnyNumbers | None = None) -> Model:
-    """A model of a characteristic polynomial with descending coefficients, each like an entry of `from_matrices`.
+    """A model of a characteristic polynomial with descending coefficients, which are like entries of `from_matrices`.
 
     Raises:
         Unfit: if there are fewer than 2 coefficients or more than 13, or the leading one is 0.
@@ -113,8 +113,8 @@ def from_coefficients(coefficients: Any, *, name: str = "stated", quantities: An
 
     More: docs/tutorials/own_system.md
     """
-    entries, max_entries = _entries(coefficients), _MAX_SIZE["coefficients"] + 1
-    row = None if entries is None or any(_entries(x) is not None for x in entries) else entries
+    entries, max_entries = _list_entries(coefficients), _MAX_SIZE["coefficients"] + 1
+    row = None if entries is None or any(_list_entries(x) is not None for x in entries) else entries
     if row is None or not 2 <= len(row) <= max_entries:
         description = "no list" if row is None else f"{len(row)} entries"
         accepted = f"a list of 2 to {max_entries} coefficients, descending"
@@ -126,7 +126,7 @@ def from_hamiltonian(H: Any, *, name: str = "stated", quantities: AnyNumbers | N
     """A model of ψ′ = −i H ψ with a complex matrix H and eigenfrequencies ω = i s.
 
     Results refer to H: ``EP2`` is an exceptional point of H, the ``abscissa`` is the greatest Im ω (gain minus loss),
-    and multiplicities are those of H. Internally the model is the real system of twice the size with
+    and multiplicities belong to H. Internally the model is the real system of twice the size with
     A = [[J, R], [−R, J]] for H + Ω = R + i J. A `Problem` chooses the carrier Ω for its ranges.
 
     Args:
@@ -150,7 +150,7 @@ def from_hamiltonian(H: Any, *, name: str = "stated", quantities: AnyNumbers | N
     return _build_model("hamiltonian", name, {"H": _read_matrix("H", H)}, quantities)
 
 
-def _entries(value: Any) -> list[Any] | None:
+def _list_entries(value: Any) -> list[Any] | None:
     """The entries of a list, a CasADi vector or an array; None for other values."""
     if isinstance(value, ca.SX | ca.DM):
         return ca.vertsplit(ca.vec(value)) if value.is_vector() and not value.is_scalar() else None
@@ -163,14 +163,14 @@ def _read_matrix(key: str, value: Any) -> Matrix:
     """The rows of a matrix. The matrices of a controller may have any shape, the others must be square."""
     if isinstance(value, ca.SX | ca.DM):
         rows: list[Any] = [ca.horzsplit(row) for row in ca.vertsplit(value)]
-    elif (entries := _entries(value)) is None or (isinstance(value, np.ndarray) and value.ndim != 2):
+    elif (entries := _list_entries(value)) is None or (isinstance(value, np.ndarray) and value.ndim != 2):
         description = f"an array of {value.ndim} dimensions" if isinstance(value, np.ndarray) else type(value).__name__
         raise Unfit(key, f"found {description}; accepted: a matrix as nested lists, a NumPy array, SX or DM")
     else:
-        rows = [_entries(row) for row in entries]
+        rows = [_list_entries(row) for row in entries]
     sizes, max_size = [None if row is None else len(row) for row in rows], _MAX_SIZE[key]
     size, accepted = len(rows), "as many rows as entries in each"
-    if key in LOOP:
+    if key in LOOP_KEYS:
         size, accepted = next(iter(sizes), 0) or 0, "rows of equal length"
     if not size or any(length != size for length in sizes):
         shape = " + ".join("?" if length is None else str(length) for length in sizes)
@@ -189,21 +189,21 @@ def _build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: 
         raise Unfit("name", f"'{name.strip()}' is a built-in model; choose another name")
     if not isinstance(quantities or {}, Mapping):
         raise Unfit("quantities", f"found {type(quantities).__name__}; accepted: a mapping of names to expressions")
-    matrices, derived = parse_entries(
-        matrices, {n: _node("quantities", n, x) for n, x in (quantities or {}).items()}, _unfit
+    matrices, quantity_nodes = parse_entries(
+        matrices, {n: _read_node("quantities", n, x) for n, x in (quantities or {}).items()}, _unfit
     )
     if of_H:
         H = matrices["H"]
-        matrices = {"H": [[x.re for x in row] for row in H], IMAGINARY: [[x.im for x in row] for row in H]}
-    by_place = {
-        (n, place(n, i, j)): x
+        matrices = {"H": [[x.re for x in row] for row in H], IMAGINARY_KEY: [[x.im for x in row] for row in H]}
+    entry_by_position = {
+        (n, describe_position(n, i, j)): x
         for n, rows in matrices.items()
         for i, row in enumerate(rows, start=1)
         for j, x in enumerate(row, start=1)
-    } | {("quantities", str(n)): x for n, x in derived.items()}
-    inputs = ca.symvar(ca.vertcat(ca.SX(0, 1), *(x for x in by_place.values() if isinstance(x, ca.SX))))
+    } | {("quantities", str(n)): x for n, x in quantity_nodes.items()}
+    inputs = ca.symvar(ca.vertcat(ca.SX(0, 1), *(x for x in entry_by_position.values() if isinstance(x, ca.SX))))
     symbols = Counter(x.name() for x in inputs)
-    entries = {position: _node(user_key(position[0]), position[1], x) for position, x in by_place.items()}
+    entries = {position: _read_node(user_key(position[0]), position[1], x) for position, x in entry_by_position.items()}
     names = formula(entries[position] for position in sort_places(kind, entries)).names
     if duplicates := [n for n, count in symbols.items() if count > 1]:
         raise Unfit(key, f"has two symbols named {min(duplicates)}; make one and use it everywhere")
@@ -212,15 +212,16 @@ def _build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: 
     for n in names:
         if reason := name_fault(n, of_H):
             raise Unfit(key, f"has a symbol named {n!r}, which {reason}; choose another name")
-    for n in derived:
+    for n in quantity_nodes:
         if reason := "is the name of a parameter" if n in names else name_fault(n, of_H):
             raise Unfit("quantities", f"{n!r} {reason}; choose another name for the quantity")
     shapes = tuple((n, len(rows), len(rows[0])) for n, rows in matrices.items())
     entry_formula = formula(entries.values(), names)
     if fault := first_fault(entry_formula):
-        (key, where), reason = list(by_place)[fault[0]], fault[1]
-        raise Unfit(user_key(key), f"{where}: {reason}")
-    return _build_from_data(kind, name.strip(), shapes, tuple(derived), entry_formula)
+        index, reason = fault
+        key, position_text = list(entry_by_position)[index]
+        raise Unfit(user_key(key), f"{position_text}: {reason}")
+    return _build_from_data(kind, name.strip(), shapes, tuple(quantity_nodes), entry_formula)
 
 
 @lru_cache(maxsize=64)
@@ -228,11 +229,16 @@ def _build_from_data(
     kind: str,
     name: str,
     shapes: tuple[_Shape, ...],
-    derived: tuple[str, ...],
+    quantity_names: tuple[str, ...],
     entry_formula: Formula,
     carrier: float = 0.0,
 ) -> Model:
-    """A model from plain data. Each process has only one object for each model."""
+    """A model from plain data. Each process has one object for each model.
+
+    Args:
+        shapes: shapes of the matrices whose entries are the first outputs of `entry_formula`.
+        quantity_names: names of the quantities, which are the other outputs.
+    """
     names = entry_formula.names
     entries = fold(entry_formula, {n: symbol(n) for n in names}, NODES)
     remaining_entries = iter(entries)
@@ -244,9 +250,9 @@ def _build_from_data(
     if zero_count == degree:
         raise Unfit(shapes[0][0], "gives a polynomial without s, which has no root")
     coefficients = formula(all_coefficients[zero_count:], names)
-    quantities = zip(derived, remaining_entries, strict=True)
+    quantities = zip(quantity_names, remaining_entries, strict=True)
     parameters = tuple(Parameter(n, "1", "parameter", latex(n)) for n in names)
-    arguments = (kind, name, shapes, derived, entry_formula)
+    arguments = (kind, name, shapes, quantity_names, entry_formula)
     model = Model(
         name=name,
         title=name,
@@ -254,10 +260,10 @@ def _build_from_data(
         sets=(ParameterSet("stated", parameters, native=dict),),
         algebraic=dict,
         polynomial=lambda **numbers: values(coefficients, numbers),
-        quantities=tuple(Quantity(n, "1", "quantity", latex(n), _function(x, names)) for n, x in quantities),
+        quantities=tuple(Quantity(n, "1", "quantity", latex(n), _make_function(x, names)) for n, x in quantities),
         pencil=None if kind == "coefficients" else _matrices(pencil(blocks, carrier), names),
         origin=(_build_from_data, (*arguments, carrier) if carrier else arguments),
-        statement=_statement(entry_formula, shapes, derived),
+        statement=_statement(entry_formula, shapes, quantity_names),
         numbers=tuple(number_text(x) for x in entry_formula.constants if getattr(x, "denominator", 0) != 1),
     )
     if kind != "hamiltonian":
@@ -265,13 +271,13 @@ def _build_from_data(
     return complex_model(
         model,
         carrier,
-        frequency_bounds(entries[: len(entries) - len(derived)]),
+        frequency_bounds(entries[: len(entries) - len(quantity_names)]),
         lambda c: _build_from_data(*arguments, *([c] if c else [])),
         _matrices(pencil(blocks), names),
     )
 
 
-def _function(x: Any, names: Sequence[str]) -> Callable[[AnyNumbers], Any]:
+def _make_function(x: Any, names: Sequence[str]) -> Callable[[AnyNumbers], Any]:
     output = formula([x], names)
     return lambda numbers: values(output, numbers)[0]
 
@@ -283,30 +289,30 @@ def _matrices(rows: Sequence[Matrix], names: Sequence[str]) -> Callable[[AnyNumb
     return lambda numbers: tuple(_split(iter(values(entry_formula, numbers)), shapes).values())
 
 
-def _count_identical_zeros(kind: str, blocks: Mapping[str, Matrix], names: Sequence[str], leading: int) -> int:
-    """The number of coefficients before the first one that is not identically 0; at most `leading`."""
+def _count_identical_zeros(kind: str, blocks: Mapping[str, Matrix], names: Sequence[str], max_count: int) -> int:
+    """The number of coefficients before the first one that is not 0 for all parameters; at most `max_count`."""
     relevant_blocks = dict(blocks)
     # The leading coefficients do not depend on these matrices.
-    for n in ("D", "K")[max(leading - 1, 0) :] if "M" in relevant_blocks else ():
+    for n in ("D", "K")[max(max_count - 1, 0) :] if "M" in relevant_blocks else ():
         relevant_blocks[n] = [[0] * len(relevant_blocks["M"]) for _ in relevant_blocks["M"]]
-    coefficients = formula(polynomial(kind, relevant_blocks)[:leading], names)
+    coefficients = formula(polynomial(kind, relevant_blocks)[:max_count], names)
     field = Field(coefficients)
     try:
         row = fold(coefficients, field.inputs, field.kind)
-        return next((k for k, c in enumerate(row) if not field.is_zero(c)), leading)
+        return next((k for k, c in enumerate(row) if not field.is_zero(c)), max_count)
     except (ZeroDivisionError, UnsupportedOperation):  # the formulas are too large to decide
         return 0
 
 
-def _statement(entry_formula: Formula, shapes: tuple[_Shape, ...], derived: Sequence[str]) -> dict[str, Any]:
+def _statement(entry_formula: Formula, shapes: tuple[_Shape, ...], quantity_names: Sequence[str]) -> dict[str, Any]:
     """Plain data that identify a model, with all digits of its numbers."""
-    texts, shared = spell_formula(entry_formula)
+    texts, long_parts = spell_formula(entry_formula)
     remaining_texts = iter(texts)
-    matrices, quantities = _split(remaining_texts, shapes), dict(zip(derived, remaining_texts, strict=True))
-    if IMAGINARY in matrices:
-        rows = zip(matrices["H"], matrices.pop(IMAGINARY), strict=True)
+    matrices, quantities = _split(remaining_texts, shapes), dict(zip(quantity_names, remaining_texts, strict=True))
+    if IMAGINARY_KEY in matrices:
+        rows = zip(matrices["H"], matrices.pop(IMAGINARY_KEY), strict=True)
         matrices["H"] = [list(map(complex_text, *row)) for row in rows]
-    return {"parameters": list(entry_formula.names), **matrices, "quantities": quantities, "shared": shared}
+    return {"parameters": list(entry_formula.names), **matrices, "quantities": quantities, "shared": long_parts}
 
 
 def _split(entries: Iterator[Any], shapes: Iterable[_Shape]) -> dict[str, Matrix]:
@@ -317,13 +323,14 @@ def _split(entries: Iterator[Any], shapes: Iterable[_Shape]) -> dict[str, Matrix
 def _leading_zeros(coefficients: Formula) -> int:
     """Number of leading coefficients that may be 0 for all parameters, e.g. if M is singular.
 
-    A coefficient is not 0 if, at one of 24 designs of many sizes and signs, its value to 60 digits is not 0.
+    A coefficient is not one of them if it is not 0, to 60 digits, at one of 24 designs of many sizes and signs.
     """
     names, rng = coefficients.names, np.random.default_rng(0)
     zero_counts: list[int] = []
     with flint.ctx.workdps(DIGITS):
         for i in range(_SAMPLES):
-            # A third of the designs has both signs; sizes are near 1 in the first half, then from 1e-6 to 1e6.
+            # A third of the designs has positive and negative numbers. The sizes are near 1 in the first half of the
+            # designs, and from 1e-6 to 1e6 in the second half.
             signs = rng.choice((-1, 1) if i % 3 == 2 else (1,), len(names))
             design = signs * 2.0 ** (rng.uniform(-0.5, 0.5, len(names)) * (6 if i < _SAMPLES // 2 else 40))
             balls = [flint.arb(c) for c in fold(coefficients, dict(zip(names, design.tolist(), strict=True)), BALLS)]
@@ -339,7 +346,7 @@ def _unfit(message: str, key: str, *name: str) -> NoReturn:
     raise Unfit(key, ": ".join([*name, message]))
 
 
-def _node(key: str, where: Any, value: Any) -> Any:
+def _read_node(key: str, position_text: Any, value: Any) -> Any:
     """An entry as a node; a text is returned unchanged.
 
     Raises:
@@ -348,19 +355,19 @@ def _node(key: str, where: Any, value: Any) -> Any:
     if isinstance(value, str | Node):
         return value
     if isinstance(value, ca.MX):
-        raise Unfit(key, f"{where}: found MX; accepted: SX, with symbols from ca.SX.sym")
+        raise Unfit(key, f"{position_text}: found MX; accepted: SX, with symbols from ca.SX.sym")
     if isinstance(value, ca.SX | ca.DM):
         if value.numel() != 1:
-            raise Unfit(key, f"{where}: is a matrix; accepted: scalar expressions")
+            raise Unfit(key, f"{position_text}: is a matrix; accepted: scalar expressions")
         inputs = ca.symvar(entry := ca.densify(ca.SX(value)))
         names = [x.name() for x in inputs]
         return nodes_from_casadi(ca.Function("entry", [ca.vertcat(ca.SX(0, 1), *inputs)], [entry]), names)[0]
     if not isinstance(value, Real) or isinstance(value, bool):
-        raise Unfit(key, f"{where}: found {short(value)}; {_ACCEPTED}")
+        raise Unfit(key, f"{position_text}: found {short(value)}; {_ACCEPTED_ENTRIES}")
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise Unfit(key, f"{where}: is {number}; {_FINITE}")
+        raise Unfit(key, f"{position_text}: is {number}; {_ACCEPTED_NUMBERS}")
     return constant(Fraction(value) if isinstance(value, Rational) else number)

@@ -24,7 +24,7 @@ from typing import Any
 import flint
 
 from tmsopt.algebra.identity import Quotient
-from tmsopt.errors import InputError, call_faults, input_error, list_faults
+from tmsopt.errors import InputError, callback_faults, input_error, list_faults
 from tmsopt.paper.ledger.algebra import PRECISION
 from tmsopt.paper.ledger.entry import (
     EXACT,
@@ -60,7 +60,7 @@ def verify(progress: Listener | None = None, only: Sequence[str] = ()) -> Ledger
 
     More: docs/explanation/paper.md
     """
-    if faults := [*list_faults("only", only, "['lscf-*']"), *call_faults("progress", progress)]:
+    if faults := [*list_faults("only", only, "['lscf-*']"), *callback_faults("progress", progress)]:
         raise InputError(faults)
     for pattern in map(str, only):
         if not select_claims([pattern]):

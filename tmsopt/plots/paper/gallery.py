@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tmsopt.executor import Crash, cores, here, processes
+from tmsopt.executor import Crash, cores, in_process, processes
 from tmsopt.records import Table
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def pictures(items: Sequence[Item], file_formats: Sequence[str]) -> Generator[tu
     Several figures are drawn by several processes. If a process crashes, its figure is drawn in this one.
     """
     workers = min(cores(), len(items))
-    with processes(workers) if workers > 1 else here() as executor:
+    with processes(workers) if workers > 1 else in_process() as executor:
         for place, picture in executor.map(_render_item, zip([item.name for item in items], file_formats, strict=True)):
             yield (
                 place,

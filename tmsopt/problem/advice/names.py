@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from operator import itemgetter
 
-from tmsopt.errors import nearest, suggest
+from tmsopt.errors import find_similar, suggest
 from tmsopt.models import MODELS, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.tables import read_table
 from tmsopt.models.user_spectrum import public_names
@@ -45,7 +45,7 @@ def suggest_name(name: str, model: Model, parameter_set: ParameterSet, accepted:
         return meaning
     entries = vocabulary(model, parameter_set)
     names = list(entries if accepted is None else accepted)
-    if not nearest(name.lower(), [n.lower() for n in names], _MIN_SIMILARITY):
+    if not find_similar(name.lower(), [n.lower() for n in names], _MIN_SIMILARITY):
         words = name.lower().replace("_", " ")
         for n in names:
             meaning = entries[n].meaning.lower()

@@ -1,7 +1,8 @@
 """Patterns and structures of a complex matrix H, converted to and from the real system of twice the size.
 
-Each eigenvalue of H is a complex pair of roots of the real system, so that an EPn of H is a CEPn there. This holds as
-long as no root meets the conjugate of another root, which the carrier frequency of H ensures.
+An eigenvalue of H corresponds to a complex pair of roots of the real system, so an EPn of H is a CEPn of the real
+system. This requires that no root meets the conjugate of another root. The carrier ensures it: a real constant that is
+added to all eigenfrequencies of H.
 """
 
 import re
@@ -14,20 +15,21 @@ from tmsopt.roots.patterns.descriptions import join_in_words, select_in_words
 from tmsopt.roots.patterns.pattern import Pattern
 
 _MEANING = {"weave": "a real eigenfrequency", "resonance": "a real double eigenfrequency"}
-_REAL = "is a pattern of a real system"
+_IS_REAL_PATTERN = "is a pattern of a real system"
 
 
 def complex_pattern_names(size: int) -> tuple[str, ...]:
-    """Names of the patterns of a matrix of a size that are not composed of others."""
-    two = [f"2EP{k}" for k in range(size // 2, 1, -1)]
-    return (*(f"EP{k}" for k in range(size, 1, -1)), *two, "weave", *(["resonance"] if size > 1 else []))
+    """Names of the patterns of a `size` × `size` matrix that are not composed of other patterns."""
+    double_names = [f"2EP{k}" for k in range(size // 2, 1, -1)]
+    return (*(f"EP{k}" for k in range(size, 1, -1)), *double_names, "weave", *(["resonance"] if size > 1 else []))
 
 
 @cache
 def complex_pattern(name: str, size: int) -> Pattern:
-    """The pattern with a name such as ``EP3`` or ``EP2+EP2``, for the eigenvalues of complex matrices of a size.
+    """The pattern with a name such as ``EP3`` or ``EP2+EP2``, for the eigenvalues of a complex `size` × `size` matrix.
 
-    Its factors are factors of the real polynomial of twice the degree, with the name `Pattern.form`, such as ``CEP3``.
+    Its factors are factors of the real polynomial of twice the degree. The pattern of this polynomial has the name
+    `Pattern.form`, such as ``CEP3``.
 
     Raises:
         ValueError: for an unknown name, or a pattern with more eigenvalues than the matrix has.
@@ -36,15 +38,15 @@ def complex_pattern(name: str, size: int) -> Pattern:
     components = parse_components(compact)
     for component in components:
         if component.kind == "CEP":
-            raise ValueError(f"'{name}' {_REAL}; for a complex H write EP{component.order}")
+            raise ValueError(f"'{name}' {_IS_REAL_PATTERN}; for a complex H write EP{component.order}")
         if component.kind == "capsize":
-            raise ValueError(f"'{name}' {_REAL}; for a complex H write weave, a real eigenfrequency")
-    count = sum(c.roots for c in components if c.kind == "EP")
+            raise ValueError(f"'{name}' {_IS_REAL_PATTERN}; for a complex H write weave, a real eigenfrequency")
+    count = sum(c.root_count for c in components if c.kind == "EP")
     if count > size:
         raise ValueError(f"'{name}' takes {count} eigenfrequencies, and H has {size}")
-    real = pattern(compact.replace("EP", "CEP"), 2 * size)
-    words = (_describe(c.kind, c.order, c.count) for c in components)
-    return replace(real, name=complex_name(real.name), meaning=" and ".join(words), marks={}, doubles=real.name)
+    real_pattern = pattern(compact.replace("EP", "CEP"), 2 * size)
+    words = " and ".join(_describe(c.kind, c.order, c.count) for c in components)
+    return replace(as_complex_pattern(real_pattern), meaning=words)
 
 
 def _describe(kind: str, order: int, count: int) -> str:
@@ -56,12 +58,14 @@ def complex_name(name: str) -> str:
     return re.sub(r"\bpair", "single", name.replace("CEP", "EP"))
 
 
-def as_complex_pattern(real: Pattern) -> Pattern:
+def as_complex_pattern(real_pattern: Pattern) -> Pattern:
     """A pattern of the real system as a pattern of H."""
-    words = real.meaning.replace(" on one vertical line", " that share one decay rate")
+    words = real_pattern.meaning.replace(" on one vertical line", " that share one decay rate")
     words = words.replace("complex double", "double complex")
     words = re.sub(r"(complex )?pair(s?)", lambda m: "eigenfrequencies" if m[2] else "eigenfrequency", words)
-    return replace(real, name=complex_name(real.name), meaning=words, marks={}, doubles=real.form)
+    return replace(
+        real_pattern, name=complex_name(real_pattern.name), meaning=words, marks={}, doubles=real_pattern.form
+    )
 
 
 def real_form_name(name: str) -> str:
@@ -69,23 +73,23 @@ def real_form_name(name: str) -> str:
     return re.sub(r"\bsingle", "pair", name.replace("EP", "CEP"))
 
 
-def describe_complex_structure(structure: str, size: int, gain: bool = False) -> str:
+def describe_complex_structure(structure: str, size: int, has_gain: bool = False) -> str:
     """A structure of eigenfrequencies of H in words; an unknown structure is returned unchanged.
 
     Args:
-        gain: whether these eigenfrequencies have the most gain, instead of the least damping.
+        has_gain: whether these eigenfrequencies have the most gain; else they have the least damping.
     """
     if structure == "undecided":
         return "double precision cannot tell which eigenfrequencies meet (undecided)"
     if structure == "single":
-        return f"one eigenfrequency {'has the most gain' if gain else 'is least damped'} (single)"
+        return f"one eigenfrequency {'has the most gain' if has_gain else 'is least damped'} (single)"
     if match := re.fullmatch(r"EP(\d+)", structure):
         order = int(match[1])
-        most = " of most gain" if gain and order != size else ""
-        which = select_in_words(order, size, "" if gain else "least damped")
-        return f"{which} eigenfrequencies{most} coincide ({structure})"
-    each = join_in_words([_describe_part(part) for part in structure.split("+")])
-    return f"{each} have one {'gain' if gain else 'decay rate'} ({structure})"
+        suffix = " of most gain" if has_gain and order != size else ""
+        selection = select_in_words(order, size, "" if has_gain else "least damped")
+        return f"{selection} eigenfrequencies{suffix} coincide ({structure})"
+    words = join_in_words([_describe_part(part) for part in structure.split("+")])
+    return f"{words} have one {'gain' if has_gain else 'decay rate'} ({structure})"
 
 
 def _describe_part(part: str) -> str:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from tmsopt.roots.patterns.components import NUMBERS, count_in_words, multiplicity_in_words
+from tmsopt.roots.patterns.components import NUMBER_WORDS, count_in_words, multiplicity_in_words
 
 STRUCTURES = {
     "EP4": "four roots coincide (EP4)",
@@ -13,7 +13,7 @@ STRUCTURES = {
     "real": "one real root is rightmost (real)",
     "undecided": "double precision cannot tell which roots meet (undecided)",
 }
-"""Special descriptions for structures of a quartic."""
+"""Structure of a quartic → its description, if it differs from the general one."""
 
 _PART = re.compile(r"(?P<count>\d*)(?P<kind>C?EP)(?P<order>\d+)|(?P<pairs>\w+) pairs|(?P<simple>pair|real)")
 
@@ -25,19 +25,19 @@ def describe_structure(structure: str, degree: int = 4) -> str:
     parts = [_PART.fullmatch(part) for part in structure.split("+")]
     if not all(parts):
         return structure
-    only = parts[0] if len(parts) == 1 else None
-    if only and only["kind"] == "EP" and not only["count"]:
-        order = int(only["order"])
+    single_part = parts[0] if len(parts) == 1 else None
+    if single_part and single_part["kind"] == "EP" and not single_part["count"]:
+        order = int(single_part["order"])
         return f"{select_in_words(order, degree, 'rightmost')} roots coincide ({structure})"
-    if only and only["kind"] == "CEP" and not only["count"]:
-        return f"{NUMBERS[int(only['order'])]} complex pairs coincide ({structure})"
+    if single_part and single_part["kind"] == "CEP" and not single_part["count"]:
+        return f"{NUMBER_WORDS[int(single_part['order'])]} complex pairs coincide ({structure})"
     return f"{join_in_words([_describe_part(part) for part in parts if part])} share one decay rate ({structure})"
 
 
-def select_in_words(order: int, degree: int, which: str) -> str:
-    """A selection of roots in words: ``both`` or ``all three`` if there are no others, else ``the three rightmost``."""
-    number = NUMBERS[order]
-    return f"the {number} {which}".rstrip() if order != degree else "both" if order == 2 else f"all {number}"
+def select_in_words(order: int, degree: int, selection: str) -> str:
+    """A selection of roots in words: ``both`` or ``all three`` if it has all roots, else ``the three rightmost``."""
+    number = NUMBER_WORDS[order]
+    return f"the {number} {selection}".rstrip() if order != degree else "both" if order == 2 else f"all {number}"
 
 
 def join_in_words(names: Sequence[str]) -> str:
@@ -50,7 +50,6 @@ def _describe_part(part: re.Match[str]) -> str:
         return {"pair": "a complex pair", "real": "a real root"}[part["simple"]]
     if part["pairs"]:
         return f"{part['pairs']} complex pairs"
-    fold = multiplicity_in_words(int(part["order"]))
-    return count_in_words(
-        int(part["count"] or 1), f"real {fold} root" if part["kind"] == "EP" else f"{fold} complex pair"
-    )
+    multiplicity = multiplicity_in_words(int(part["order"]))
+    noun = f"real {multiplicity} root" if part["kind"] == "EP" else f"{multiplicity} complex pair"
+    return count_in_words(int(part["count"] or 1), noun)

@@ -20,10 +20,10 @@ from tmsopt.roots.stability import hurwitz_minors
 
 Roots = NDArray[np.complex128]
 
-_NAME = "<U32"
+_NAME_TYPE = "<U32"
 
-_UNRELATED = tuple(p**0.5 for p in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37))
-"""Values of the unknowns without rational relations. For these values only identical factors are equal."""
+_GENERIC_VALUES = tuple(p**0.5 for p in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37))
+"""Values of the unknowns that have no rational relation, so that only identical factors have equal coefficients."""
 
 
 @dataclass(frozen=True)
@@ -31,19 +31,20 @@ class Pattern:
     """A set of polynomials given by a factored form.
 
     Attributes:
-        name: as written in a problem file.
-        meaning: one line.
+        name: the name in a problem file.
+        meaning: a description of one line.
         unknowns: names of the unknown factor coefficients.
-        factors: the monic factors for given unknowns, for numbers of any kind.
+        factors: function of the unknowns that gives the monic factors, for numbers of any kind.
         guesses: function of numeric roots that gives starting values of the unknowns.
-        nonnegative: expressions of the unknowns that must be ≥ 0.
-        abscissa: largest real part of the roots, if it is a smooth expression of the unknowns.
-        rest: the factors with roots that may leave the imaginary axis; all factors by default.
+        nonnegative: function of the unknowns that gives expressions that must be ≥ 0.
+        abscissa: function of the unknowns that gives the largest real part of the roots; None if it is not smooth.
+        rest: function of the unknowns that gives the factors without fixed roots on the imaginary axis; by default all
+            factors.
         test: for codimension 1, a function of the coefficients that changes sign across the set; nan where it has no
             meaning.
         marks: name of a more special pattern → expression of the unknowns that is 0 on it.
         ends: unknown → event where it reaches 0 and the pattern ends.
-        degree: of the polynomials.
+        degree: degree of the polynomials.
         doubles: for a pattern of a complex matrix, the name of the same pattern of the real system of twice the size.
 
     Example:
@@ -74,7 +75,7 @@ class Pattern:
 
     @property
     def codimension(self) -> int:
-        """Number of conditions on the parameters: monic coefficients less the unknowns."""
+        """Number of conditions on the parameters: the degree minus the number of unknowns."""
         return self.degree - len(self.unknowns)
 
     @property
@@ -85,7 +86,7 @@ class Pattern:
         return tuple(next(k for k, (c, d) in enumerate(zip(self.monic(u), base, strict=True)) if c != d) for u in units)
 
     def scaled_unknowns(self, unknowns: Sequence[Any]) -> list[Any]:
-        """Unknowns of arrays in units of the size of the roots, independent of the unit of time."""
+        """The unknowns (arrays or numbers) in units of the size of the roots, independent of the unit of time."""
         size = mean_size(self.monic(unknowns)) + 1e-300
         return [u / size**power for u, power in zip(unknowns, self.powers, strict=True)]
 
@@ -95,7 +96,7 @@ class Pattern:
 
     def distinct_factors(self, unknowns: Sequence[Any]) -> list[tuple[list[Any], int]]:
         """The distinct factors for given unknowns, each with its multiplicity."""
-        samples = [tuple(f) for f in self.factors(_UNRELATED[: len(self.unknowns)])]
+        samples = [tuple(f) for f in self.factors(_GENERIC_VALUES[: len(self.unknowns)])]
         factors = self.factors(unknowns)
         return [(factors[samples.index(s)], samples.count(s)) for s in dict.fromkeys(samples)]
 
@@ -111,13 +112,13 @@ class Pattern:
         """Name of the pattern at each point. 2EP2 and CEP2 form one set; the sign of b² − 4c distinguishes them."""
         base_name = self.name.removeprefix("2").removeprefix("C")
         if self.doubles or self.name not in (f"2{base_name}", f"C{base_name}"):
-            return np.full(np.shape(unknowns[0]), self.name, dtype=_NAME)
+            return np.full(np.shape(unknowns[0]), self.name, dtype=_NAME_TYPE)
         b, c = unknowns[:2]
-        return np.where(b * b - 4 * c >= 0, f"2{base_name}", f"C{base_name}").astype(_NAME)
+        return np.where(b * b - 4 * c >= 0, f"2{base_name}", f"C{base_name}").astype(_NAME_TYPE)
 
 
 def mean_size(monic: Sequence[Any]) -> NDArray[np.float64]:
-    """Mean size of the roots, the largest of Maclaurin's means of the coefficients; |r| for an n-fold root r."""
+    """Mean size of the roots: the largest of Maclaurin's means of the coefficients. For an n-fold root r it is |r|."""
     n = len(monic) - 1
     means = [(np.abs(monic[k]) / comb(n, k)) ** (1 / k) for k in range(1, n + 1)]
     return np.asarray(np.max(np.broadcast_arrays(*means), axis=0), dtype=float)
@@ -129,7 +130,7 @@ def quadratic(pair: Roots) -> list[float]:
 
 
 def _choose_two(roots: Roots) -> list[tuple[Roots, Roots]]:
-    """Every choice of two roots that is closed under conjugation, with the other roots."""
+    """Every choice of two roots that are real or conjugate, each with the array of the other roots."""
     indices = range(len(roots))
     choices = [(roots[list(c)], roots[[k for k in indices if k not in c]]) for c in combinations(indices, 2)]
     tolerance = 1e-9 * (np.abs(roots).max() + 1e-300)
@@ -141,7 +142,7 @@ def _choose_two(roots: Roots) -> list[tuple[Roots, Roots]]:
 
 
 def _double_quadratic_guess(roots: Roots) -> list[list[float]]:
-    """b and c of (s² + bs + c)² from its first two coefficients."""
+    """b and c of (s² + bs + c)², from the sums of the roots and of their squares."""
     mean = roots.mean().real
     square = (roots**2).sum().real
     b = -2 * mean
@@ -154,7 +155,7 @@ def _triple_guesses(roots: Roots) -> list[list[float]]:
 
 
 def _pair_test(a: Sequence[Any]) -> Any:
-    """The Hurwitz determinant Δ3, 0 where two roots add up to 0; nan where these are real, for W = a3/a1 ≤ 0."""
+    """The Hurwitz determinant Δ3. It is 0 where two roots add up to 0, and nan where these are real: W = a3/a1 ≤ 0."""
     return np.where(a[1] * a[3] > 0, hurwitz_minors(a)[2], np.nan)
 
 
@@ -195,5 +196,5 @@ QUARTIC: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "resonance": {"guesses": lambda z: [[float(np.abs(z).mean()) ** 2]]},
     }
 )
-"""Patterns of a quartic that are not composed of others → fields that replace those of the general construction: direct
-guesses and shorter words and names."""
+"""Pattern of a quartic that is not composed of other patterns → fields that differ from those of other degrees: direct
+guesses, and shorter words and names."""

@@ -1,8 +1,6 @@
 """Encloses the roots of a polynomial, and of the nearest polynomial with a structure.
 
-Coefficients and roots are balls: intervals with a midpoint and a radius.
-
-The precision is that of `flint.ctx`.
+Coefficients and roots are balls: intervals with a midpoint and a radius. `flint.ctx` sets the precision.
 """
 
 import math
@@ -21,10 +19,10 @@ from tmsopt.roots.patterns.naming import find_shape
 from tmsopt.roots.patterns.shape import Shape
 from tmsopt.roots.polynomial import Root, evaluate, product, rightmost_first
 
-_STEPS = 80  # of Gauss–Newton
-_FLOOR = 1000  # median root divided by the size of the smallest root in the sizes of terms
-_LOST_BITS = 7.5  # in the normal equations, for each degree
-_TRUSTED = 2  # half of the bits of a converged fit are trusted
+_MAX_STEPS = 80  # Gauss–Newton steps
+_MAX_SIZE_RATIO = 1000  # a root smaller than the median root divided by this counts as that size in sizes of terms
+_LOST_BITS = 7.5  # bits that the normal equations lose, for each root
+_TRUSTED_DIVISOR = 2  # half of the bits of a converged fit are trusted
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,7 @@ class EnclosedRoot:
     multiplicity: int = 1
 
     @property
-    def real(self) -> bool:
+    def is_real(self) -> bool:
         """Whether the root is proved to be real."""
         return bool(self.im == 0)
 
@@ -51,7 +49,7 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[EnclosedRoot, ...] | No
 
     First the roots z of the polynomial of the midpoints are isolated. The disc of radius n |p(z)/p′(z)| around z then
     contains a root of every p in the balls (Laguerre), exactly one if the discs are disjoint, and a real one if z is
-    real. Multiple roots are possible at 0 and for exact coefficients.
+    real. Multiple roots are found only at 0 and for exact coefficients.
 
     Args:
         coefficients: descending, as balls or exact fractions.
@@ -59,13 +57,13 @@ def enclosed_roots(coefficients: Sequence[Any]) -> tuple[EnclosedRoot, ...] | No
     terms = [flint.arb(as_ball(c)) for c in coefficients]
     if not all(t.is_finite() for t in terms):
         return None
-    zeros = 0
+    zero_count = 0
     while terms and terms[-1] == 0:
         terms.pop()
-        zeros += 1
+        zero_count += 1
     while terms and terms[0] == 0:
         terms.pop(0)
-    roots = [EnclosedRoot(flint.arb(0), flint.arb(0), zeros)] if zeros else []
+    roots = [EnclosedRoot(flint.arb(0), flint.arb(0), zero_count)] if zero_count else []
     degree = len(terms) - 1
     if degree > 0:
         slope = [(degree - k) * c for k, c in enumerate(terms[:-1])]
@@ -93,8 +91,11 @@ def factor_roots(factor: Sequence[Any]) -> Sequence[EnclosedRoot] | None:
     zero, discriminant = flint.arb(0), b * b - 4 * c
     if discriminant > 0:
         width = discriminant.sqrt()
-        far = (-b - width) / 2 if b > 0 else (width - b) / 2
-        return [EnclosedRoot(far, zero), EnclosedRoot(-b - far if far.contains(0) else c / far, zero)]
+        larger_root = (-b - width) / 2 if b > 0 else (width - b) / 2
+        return [
+            EnclosedRoot(larger_root, zero),
+            EnclosedRoot(-b - larger_root if larger_root.contains(0) else c / larger_root, zero),
+        ]
     height = (-discriminant).sqrt() / 2
     return [EnclosedRoot(-b / 2, height), EnclosedRoot(-b / 2, -height)] if discriminant < 0 else None
 
@@ -112,7 +113,8 @@ def nearest_roots(coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[E
 
     Args:
         coefficients: descending, as balls or exact fractions.
-        roots: of a fit in double precision; their multiplicities and ties are the structure.
+        roots: roots of a fit in double precision. Their multiplicities, and equal real parts of the rightmost roots,
+            are the structure.
     """
     terms = [flint.arb(as_ball(c)) for c in coefficients]
     monic = [c / terms[0] for c in terms]
@@ -120,23 +122,23 @@ def nearest_roots(coefficients: Sequence[Any], roots: Sequence[Root]) -> tuple[E
         return None
     unit = flint.arb(2) ** round(math.log2(max(1e-300, *(abs(complex(r.re, r.im)) for r in roots))))
     shape, unknowns = find_shape([Root(float(r.re / unit), float(r.im / unit), r.multiplicity) for r in roots])
-    start = [flint.arb(x) for x in unknowns]
+    guess = [flint.arb(x) for x in unknowns]
     target = [(c / unit**k).mid() for k, c in enumerate(monic)]
-    nearest = _fit_shape(shape, start, target)
+    nearest = _fit_shape(shape, guess, target)
     return None if nearest is None else tuple(EnclosedRoot(z.re * unit, z.im * unit, z.multiplicity) for z in nearest)
 
 
 def _fit_shape(shape: Shape, u: list[Any], target: Sequence[Any]) -> tuple[EnclosedRoot, ...] | None:
-    """Roots of the nearest polynomial of a shape, from a start."""
-    small = flint.arb(2) ** (_LOST_BITS * (len(target) - 1) - flint.ctx.prec)
-    relative_radius = flint.arb(2) ** (-flint.ctx.prec // _TRUSTED)
-    for _ in range(_STEPS):
+    """Roots of the nearest polynomial of a shape, from a first guess u; None if the fit does not converge."""
+    convergence_limit = flint.arb(2) ** (_LOST_BITS * (len(target) - 1) - flint.ctx.prec)
+    relative_radius = flint.arb(2) ** (-flint.ctx.prec // _TRUSTED_DIVISOR)
+    for _ in range(_MAX_STEPS):
         step = _step(shape, u, target)
         if step is None:
             return None
         u = [(x + d).mid() for x, d in zip(u, step, strict=True)]
         size = max(abs(x) for x in u)
-        if all(abs(d) <= small * size for d in step):
+        if all(abs(d) <= convergence_limit * size for d in step):
             roots = _shape_roots(shape, [x + flint.arb(0, (size * relative_radius).upper()) for x in u])
             return None if roots is None else rightmost_first(roots)
     return None
@@ -148,13 +150,13 @@ def nearest_double(ball: Any) -> float | None:
 
 
 def nearest_decimal(ball: Any, digits: int) -> float | None:
-    """As `nearest_double`, after rounding the ball to a number of significant decimal digits."""
+    """Like `nearest_double`, but the ends are first rounded to so many significant decimal digits."""
     context = Context(prec=digits, rounding=ROUND_HALF_EVEN)
     return _round_ball(ball, lambda end: context.divide(Decimal(int(end.p)), Decimal(int(end.q))))
 
 
 def _round_ball(ball: Any, round_end: Callable[[flint.fmpq], float | Decimal]) -> float | None:
-    """The number to which both ends of a ball, as exact fractions, round."""
+    """The number to which both ends of a ball round; None if they round differently, nan if the ball is not finite."""
     if isinstance(ball, flint.fmpq):
         ends = [ball]
     elif isinstance(ball, flint.arb) and ball.is_finite():
@@ -186,7 +188,7 @@ def _shape_roots(shape: Shape, u: Sequence[Any]) -> list[EnclosedRoot] | None:
 
 
 def _step(shape: Shape, u: Sequence[Any], target: Sequence[Any]) -> list[Any] | None:
-    """Gauss–Newton step of the weighted least squares, with the weights at its start."""
+    """Gauss–Newton step of the weighted least squares, with the weights at u; None if the equations are singular."""
     roots = _shape_roots(shape, u)
     if roots is None:
         return None
@@ -206,5 +208,5 @@ def _weights(roots: Sequence[EnclosedRoot]) -> list[Any]:
     sizes = sorted((r.modulus.mid() for r in roots for _ in range(r.multiplicity)), key=float)
     n = len(sizes)
     median = (sizes[(n - 1) // 2] + sizes[n // 2]) / 2
-    floor = (sizes[-1] if median == 0 else median) / _FLOOR
+    floor = (sizes[-1] if median == 0 else median) / _MAX_SIZE_RATIO
     return [as_ball(c) for c in product(*[[flint.arb(1), size.max(floor).mid()] for size in sizes])]

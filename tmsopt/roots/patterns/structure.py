@@ -17,21 +17,24 @@ from tmsopt.roots.polynomial import Root, rightmost_first
 ROUNDING = 8 * np.finfo(float).eps
 """Relative rounding error of the coefficients of a quartic in double precision."""
 
-HIGHEST = 12
+MAX_DEGREE = 12
 """Highest degree of a polynomial whose structure can be decided."""
 
-_BOUNDARY = 1e-10  # relative to the squared size of the roots: a pattern contains its boundary, as CEP2 contains EP4
-_LARGEST_EXPONENT = 1023  # of 2 in a double
-_ZERO = np.finfo(float).eps ** 2  # smaller real parts, relative to the largest root, are rounding errors of a fit
+_BOUNDARY_TOLERANCE = 1e-10
+"""An expression that must be ≥ 0 may be below 0 by this share of the squared size of the roots. So a pattern contains
+its boundary; for example, CEP2 contains EP4."""
+
+_MAX_EXPONENT = 1023  # largest power of 2 of a double
+_ZERO_SHARE = np.finfo(float).eps ** 2  # a smaller real part, relative to the largest root, is a rounding error
 
 
 @dataclass(frozen=True)
 class Structure:
-    """The roots on the rightmost vertical line, with their multiplicities.
+    """The multiplicities of the roots on the rightmost vertical line, and the roots.
 
     Attributes:
         name: ``EPk`` for a k-fold real root, ``CEPk`` for a k-fold complex pair, ``real``, ``pair``, ``two pairs`` …
-            for simple ones, joined by ``+`` as in ``EP2+pair``; ``2EP2`` for a quartic with two real double roots;
+            for simple roots, joined by ``+`` as in ``EP2+pair``; ``2EP2`` for a quartic with two real double roots;
             ``undecided`` if double precision does not suffice.
         roots: all roots of the nearest polynomial with the structure, with multiplicities.
         distance: relative change of the coefficients (root sum of squares) to that polynomial.
@@ -54,19 +57,19 @@ class Structure:
         return max((root.re for root in self.roots), default=float("nan"))
 
 
-@np.errstate(all="ignore")  # roots 300 orders apart
+@np.errstate(all="ignore")  # roots may differ by 300 orders of magnitude
 def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike | None = None) -> Structure:
     """Structure of the roots of a real polynomial of degree 1 to 12, coefficients descending, shape (n + 1,).
 
     A structure holds if a polynomial with exactly this structure lies within `tolerance`. The result is the most
-    degenerate structure that holds, or ``undecided`` if the distance differs from the tolerance by less than rounding
-    errors, as always for tolerance 0 at an exceptional point.
+    degenerate structure that holds. It is ``undecided`` if the distance differs from the tolerance by less than
+    rounding errors, for example if the tolerance is 0 at an exceptional point.
 
     Args:
         tolerance: root sum of squares of the changes of the coefficients, each relative to the size of its terms.
-        off: rounding errors of the coefficients, if known, shape (n + 1,). A small difference of large numbers is then
-            not judged relative to its own size, and a coefficient far above its error is judged by the true sizes of
-            the roots.
+        off: rounding errors of the coefficients, if known, shape (n + 1,). The change of a small difference of large
+            numbers is then not relative to its own size. The change of a coefficient far above its error is relative
+            to the true sizes of the roots.
 
     Raises:
         ValueError: for another shape, coefficients that are not finite, or a leading 0.
@@ -80,7 +83,7 @@ def structure(coefficients: ArrayLike, tolerance: float = 1e-12, off: ArrayLike 
     c = _validate(coefficients)
     z = numeric_roots(c)
     nonzero = np.abs(z[(z != 0) & np.isfinite(z)])
-    power = min(round(np.mean(np.log2(nonzero))), _LARGEST_EXPONENT) if nonzero.size else 0
+    power = min(round(np.mean(np.log2(nonzero))), _MAX_EXPONENT) if nonzero.size else 0
     unit = 2.0**power
     monic, size = _scale(c, z, power, off, tolerance)
     rounding = ROUNDING * (len(c) - 1) / 4
@@ -121,7 +124,7 @@ def _scale(c: Array, z: Roots, power: int, off: ArrayLike | None, tolerance: flo
 def pattern_distance(
     pattern: Pattern, coefficients: ArrayLike, off: ArrayLike | None = None, tolerance: float = 0.0
 ) -> float:
-    """Least relative change of the coefficients (root sum of squares) to a pattern; inf if no fit reaches it.
+    """Least relative change of the coefficients (root sum of squares) to a pattern; inf if no fit has the pattern.
 
     Args:
         off, tolerance: see `structure`.
@@ -137,7 +140,7 @@ def pattern_distance(
         fits, z = _fit_pattern(pattern, coefficients, off, tolerance)
     except ValueError:
         return float("inf")
-    lower_bound = -_BOUNDARY * np.abs(z).max() ** 2
+    lower_bound = -_BOUNDARY_TOLERANCE * np.abs(z).max() ** 2
     distances = (distance for distance, u in fits if all(value >= lower_bound for value in pattern.nonnegative(u)))
     return next(distances, float("inf"))
 
@@ -153,7 +156,7 @@ def _fit_pattern(
     """Distance and unknowns of the fit from each guess, the nearest first, and the numeric roots.
 
     Raises:
-        ValueError: if the degree of the polynomial is not that of the pattern.
+        ValueError: if the polynomial and the pattern have different degrees.
     """
     c = _validate(coefficients)
     if len(c) - 1 != pattern.degree:
@@ -173,8 +176,8 @@ def guess_distance(pattern: Pattern, coefficients: Array, z: Roots) -> float:
 
 def _validate(coefficients: ArrayLike) -> Array:
     c = np.asarray(coefficients, dtype=float)
-    if c.ndim != 1 or not 2 <= c.size <= HIGHEST + 1:
-        raise ValueError(f"found coefficients of shape {c.shape}; accepted: 2 to {HIGHEST + 1} of them, descending")
+    if c.ndim != 1 or not 2 <= c.size <= MAX_DEGREE + 1:
+        raise ValueError(f"found coefficients of shape {c.shape}; accepted: 2 to {MAX_DEGREE + 1} of them, descending")
     if not np.all(np.isfinite(c)) or c[0] == 0:
         raise ValueError(
             "found a coefficient that is not finite, or a leading 0; accepted: finite ones, the leading one not 0"
@@ -186,21 +189,21 @@ def _make_structure(fit: Fit, numeric: Roots, unit: float) -> Structure:
     """The structure of a fit, with its roots in the unit of the polynomial."""
     if not fit.shape.groups:
         return Structure("pair" if numeric[np.argmax(numeric.real)].imag else "real", _simple_roots(numeric), 0.0)
-    upper = [(z * unit, group.multiplicity) for z, group in zip(fit.places, fit.shape.groups, strict=True)]
+    upper = [(z * unit, group.multiplicity) for z, group in zip(fit.group_roots, fit.shape.groups, strict=True)]
     upper += [(z * unit, 1) for z in (numeric_roots(fit.rest_factor) if fit.shape.rest_degree else ()) if z.imag >= 0]
-    right = max(z.real for z, _ in upper)
-    line = [Group(multiplicity, z.imag == 0) for z, multiplicity in upper if z.real == right]
-    zero_size = _ZERO * max(abs(z) for z, _ in upper)
+    abscissa = max(z.real for z, _ in upper)
+    line_groups = [Group(multiplicity, z.imag == 0) for z, multiplicity in upper if z.real == abscissa]
+    zero_size = _ZERO_SHARE * max(abs(z) for z, _ in upper)
     all_roots = ((w, m) for z, m in upper for w in ((z, z.conjugate()) if z.imag else (z,)))
     roots = [Root(float(w.real) if abs(w.real) > zero_size else 0.0, float(w.imag), m) for w, m in all_roots]
-    two_double = [(root.im, root.multiplicity) for root in roots] == [(0.0, 2), (0.0, 2)]
-    return Structure("2EP2" if two_double else _name_line(line), rightmost_first(roots), fit.distance)
+    is_two_double = [(root.im, root.multiplicity) for root in roots] == [(0.0, 2), (0.0, 2)]
+    return Structure("2EP2" if is_two_double else _name_line(line_groups), rightmost_first(roots), fit.distance)
 
 
-def _name_line(line: Sequence[Group]) -> str:
+def _name_line(line_groups: Sequence[Group]) -> str:
     """Name of the roots and pairs on a vertical line."""
-    multiple = sorted((g.multiplicity, g.real) for g in line if g.multiplicity > 1)
-    return join_group_names((f"EP{m}" if real else f"CEP{m}" for m, real in reversed(multiple)), line)
+    multiple = sorted((g.multiplicity, g.is_real) for g in line_groups if g.multiplicity > 1)
+    return join_group_names((f"EP{m}" if is_real else f"CEP{m}" for m, is_real in reversed(multiple)), line_groups)
 
 
 def _simple_roots(numeric: Roots) -> tuple[Root, ...]:

@@ -1,5 +1,5 @@
 """Millions of quartics at once.
 
-In: arrays of coefficients. Out: factors, abscissae, damping ratios and stability classes, accurate near exceptional
-points too. Open `quartic` first.
+In: arrays of coefficients. Out: factors, abscissae, damping ratios and stability classes, which are accurate even near
+exceptional points. Open `quartic` first.
 """

@@ -13,7 +13,8 @@ from tmsopt.roots.quartics.quartic import flatten_columns, make_blocks
 from tmsopt.roots.stability import is_stable
 
 CLASSES = ("undefined", "capsize", "weave", "stable", "heavily damped")
-"""Names of the class codes 0 … 4, from worst to best; undefined means a leading 0 or a coefficient not finite."""
+"""Names of the class codes 0 … 4, from worst to best. A class is undefined if the leading coefficient is 0 or a
+coefficient is not finite."""
 
 Codes = NDArray[np.int8]
 
@@ -26,7 +27,7 @@ class Classes:
         kind: codes of CLASSES: unstable with a real root ≥ 0 (capsize), unstable without one (weave), stable, and
             stable with only real, distinct roots (heavily damped).
         real_roots: number of distinct real roots.
-        doubtful: number of quartics with signs that rounding could change, which exact arithmetic decided.
+        doubtful: number of quartics for which rounding could change a sign; exact arithmetic decided their classes.
 
     Example:
         >>> found = tmsopt.roots.quartic_classes(1, 4, 6, 4, [1, -1])  # (s + 1)⁴, and a root right of 0
@@ -43,9 +44,10 @@ class Classes:
 
 @ignore_option("compiled")
 def quartic_classes(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, a4: ArrayLike) -> Classes:
-    """Classes of the quartics a0 s⁴ + … + a4, coefficients of any shapes that broadcast.
+    """Classes of the quartics a0 s⁴ + … + a4. The shapes of the coefficients must broadcast.
 
-    Stability agrees with `is_stable`, the count with `real_roots`, exact for the coefficients as stored.
+    Stability agrees with `is_stable`, and the number of real roots with `real_roots`. Both are exact for the polynomial
+    whose coefficients are exactly the given doubles.
 
     Raises:
         ValueError: for shapes that cannot be broadcast.
@@ -83,7 +85,7 @@ def quartic_is_stable(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike
     stable = np.empty(a[0].size, np.bool_)
     with np.errstate(all="ignore"):
         for block in make_blocks(stable.size):
-            stable[block] = signs.stable(*(c[block] for c in a))
+            stable[block] = signs.is_stable_by_signs(*(c[block] for c in a))
     return stable.reshape(shape)
 
 
@@ -94,15 +96,15 @@ def count_classes(c: Array) -> tuple[Codes, Codes]:
         c: coefficients, shape (rows, degree + 1).
     """
     kind, count = np.zeros((2, len(c)), np.int8)
-    regular = np.flatnonzero(np.all(np.isfinite(c), axis=1) & (c[:, 0] != 0))
-    if regular.size:
-        c = c[regular]
+    regular_rows = np.flatnonzero(np.all(np.isfinite(c), axis=1) & (c[:, 0] != 0))
+    if regular_rows.size:
+        c = c[regular_rows]
         negative, positive = real_roots(c)
-        zero = c[:, -1] == 0
+        has_zero_root = c[:, -1] == 0
         with np.errstate(all="ignore"):
             stable = is_stable(c)
-        damped = np.where(negative == c.shape[1] - 1, CLASSES.index("heavily damped"), CLASSES.index("stable"))
-        unstable = np.where((positive > 0) | zero, CLASSES.index("capsize"), CLASSES.index("weave"))
-        kind[regular] = np.where(stable, damped, unstable)
-        count[regular] = negative + positive + zero
+        stable_kind = np.where(negative == c.shape[1] - 1, CLASSES.index("heavily damped"), CLASSES.index("stable"))
+        unstable_kind = np.where((positive > 0) | has_zero_root, CLASSES.index("capsize"), CLASSES.index("weave"))
+        kind[regular_rows] = np.where(stable, stable_kind, unstable_kind)
+        count[regular_rows] = negative + positive + has_zero_root
     return kind, count

@@ -1,7 +1,7 @@
 """The two real quadratic factors of a quartic (s² + p1 s + q1)(s² + p2 s + q2), as elementwise formulas.
 
 They use only arithmetic, `where` and NumPy functions of numbers, so that the explorer can translate them to JavaScript.
-Divisions by 0 are intended: a result that is not finite has no acceptable error.
+Divisions by 0 are intended: a result that is not finite has an error that is not finite, and is not accepted.
 """
 
 from typing import Any
@@ -12,16 +12,17 @@ where: Any = np.where
 
 Real = Any
 """An array of numbers."""
-Four = tuple[Real, Real, Real, Real]
+
+FourArrays = tuple[Real, Real, Real, Real]
 """Four arrays: p1, q1, p2, q2 or b1, b2, b3, b4."""
 
 
-def monic(a0: Real, a1: Real, a2: Real, a3: Real, a4: Real) -> Four:
-    """Coefficients b1 … b4 divided by the leading one; if any is not finite, b4 is not finite."""
+def monic(a0: Real, a1: Real, a2: Real, a3: Real, a4: Real) -> FourArrays:
+    """The coefficients b1 … b4 of the monic quartic; if one of a0 … a4 is not finite, b4 is not finite."""
     return a1 / a0, a2 / a0, a3 / a0, a4 / a0 + 0.0 * a0
 
 
-def start(b1: Real, b2: Real, b3: Real, b4: Real) -> Four:
+def closed_form_factors(b1: Real, b2: Real, b3: Real, b4: Real) -> FourArrays:
     """Factors of s⁴ + b1 s³ + b2 s² + b3 s + b4 in closed form.
 
     With t = s + b1/4 the quartic is t⁴ + B t² + C t + D = (t² + u t + v)(t² − u t + w), and U = u² is the largest
@@ -37,10 +38,10 @@ def start(b1: Real, b2: Real, b3: Real, b4: Real) -> Four:
     B2, D4, C2 = B * B, 4.0 * D, C * C
     E = B2 - D4
     U = largest_root((B2 + 3.0 * D4) * (1 / 9), B * (B2 - 9.0 * D4) * (1 / 27) + 0.5 * C2) - B * (2 / 3)
-    # For small U the difference above has few digits left, but the cubic is nearly quadratic.
+    # For small U, the subtraction above loses most digits, but the cubic is nearly quadratic.
     width = np.sqrt(np.maximum(E * E + 8.0 * B * C2, 0.0))
-    small = where(E < 0.0, (width - E) / (4.0 * B), where(C2 > 0.0, 2.0 * C2 / (E + width), 0.0))
-    U = where(U < 2e-4 * B, small, np.maximum(U, 0.0))
+    small_U = where(E < 0.0, (width - E) / (4.0 * B), where(C2 > 0.0, 2.0 * C2 / (E + width), 0.0))
+    U = where(U < 2e-4 * B, small_U, np.maximum(U, 0.0))
     residual = ((U + 2.0 * B) * U + E) * U - C2
     for _ in range(2):
         trial = np.maximum(U - residual / ((3.0 * U + 4.0 * B) * U + E), 0.0)
@@ -57,17 +58,17 @@ def start(b1: Real, b2: Real, b3: Real, b4: Real) -> Four:
 def correct_smaller(first: Real, second: Real, product: Real) -> tuple[Real, Real]:
     """Two numbers with a known product; the smaller one is recomputed from the product and the larger one."""
     first_is_larger = np.abs(first) > np.abs(second)
-    large = where(first_is_larger, first, second)
-    small = where(large == 0.0, 0.0, product / large)
-    return where(first_is_larger, large, small), where(first_is_larger, small, large)
+    larger = where(first_is_larger, first, second)
+    smaller = where(larger == 0.0, 0.0, product / larger)
+    return where(first_is_larger, larger, smaller), where(first_is_larger, smaller, larger)
 
 
 def largest_root(Q: Real, R: Real) -> Real:
     """Largest real root of x³ − 3 Q x − 2 R, to 7 digits relative to the spread of the roots.
 
-    For three real roots, x = 2 √Q cos(arccos(w)/3) with w = R/Q^(3/2). The cosine is an analytic function of √(1 + w),
-    here an interpolation polynomial in Chebyshev points with an error of 1e-7. Its constant ½ is exact, so that a
-    double root stays double.
+    For three real roots, x = 2 √Q cos(arccos(w)/3) with w = R/Q^(3/2). The cosine is an analytic function of √(1 + w).
+    It is replaced by an interpolation polynomial in Chebyshev points with an error of 1e-7. The constant ½ of this
+    polynomial is exact, so that a double root stays double.
     """
     Q3 = Q * Q * Q
     S = R * R - Q3
@@ -97,11 +98,11 @@ def error(b1: Real, b2: Real, b3: Real, b4: Real, p1: Real, q1: Real, p2: Real, 
     return np.maximum(np.maximum(e1, e2), np.maximum(e3, e4))
 
 
-def newton(b1: Real, b2: Real, b3: Real, b4: Real, p1: Real, q1: Real, p2: Real, q2: Real) -> Four:
-    """One step of Newton's method on both factors; not finite if they share both roots.
+def newton_step(b1: Real, b2: Real, b3: Real, b4: Real, p1: Real, q1: Real, p2: Real, q2: Real) -> FourArrays:
+    """One step of Newton's method on both factors; the result is not finite if they share both roots.
 
     The changes solve δf1 f2 ≡ r mod f1 and δf2 f1 ≡ r mod f2 with the residual r. Each factor has its own unit, so that
-    the roots of the two may be of very different size.
+    the roots of one factor may be much larger than the roots of the other.
     """
     r1, r2, r3, r4 = b1 - (p1 + p2), b2 - (q1 + q2 + p1 * p2), b3 - (p1 * q2 + p2 * q1), b4 - q1 * q2
     u, v = p2 - p1, q2 - q1
@@ -126,22 +127,22 @@ def abscissa(p: Real, q: Real) -> Real:
 
 
 def damping_ratio(p: Real, q: Real) -> Real:
-    """Least −Re s/|s| over the roots of s² + p s + q; a root at 0 counts as 0."""
-    real = where((q < 0.0) | (p < 0.0), -1.0, where(q == 0.0, 0.0, 1.0))
-    return where(0.25 * p * p < q, 0.5 * p / np.sqrt(np.abs(q)), real)
+    """Least −Re s/|s| over the roots of s² + p s + q, where the ratio of a root 0 is 0."""
+    ratio_if_real = where((q < 0.0) | (p < 0.0), -1.0, where(q == 0.0, 0.0, 1.0))
+    return where(0.25 * p * p < q, 0.5 * p / np.sqrt(np.abs(q)), ratio_if_real)
 
 
-def root_pair(p: Real, q: Real) -> Four:
+def root_pair(p: Real, q: Real) -> FourArrays:
     """Real and imaginary parts of both roots of s² + p s + q, with exact conjugates."""
     half = -0.5 * p
     square = half * half - q
     width = np.sqrt(np.abs(square))
-    far = half + where(half < 0.0, -1.0, 1.0) * where(q == 0.0, np.abs(half), width)
-    near = where(far == 0.0, 0.0, q / far)
+    larger_root = half + where(half < 0.0, -1.0, 1.0) * where(q == 0.0, np.abs(half), width)
+    smaller_root = where(larger_root == 0.0, 0.0, q / larger_root)
     is_pair = square < 0.0
     return (
-        where(is_pair, half, far),
+        where(is_pair, half, larger_root),
         where(is_pair, width, 0.0),
-        where(is_pair, half, near),
+        where(is_pair, half, smaller_root),
         where(is_pair, -width, 0.0),
     )

@@ -1,8 +1,8 @@
 """Roots of many real quartics at once, as their two real quadratic factors.
 
 Every quartic is factored in closed form. If the factors do not reproduce its coefficients to 4e-15, Newton's method
-refines them. The few quartics still beyond 5e-14 have roots of very different size, tiny or huge roots, or several at
-0; companion eigenvalues solve them, in a unit near the largest root.
+refines them. The error of a few quartics is then still above 5e-14: they have roots of very different size, tiny or
+huge roots, or several roots at 0. Companion eigenvalues solve them, in a unit near the largest root.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,15 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from tmsopt.deprecated import ignore_option
 from tmsopt.records import Array
-from tmsopt.roots.numeric import GOOD, polish, quadratic_roots, roots
+from tmsopt.roots.numeric import GOOD_ERROR, polish, quadratic_roots, roots
 from tmsopt.roots.quartics import factors
 
-_BLOCK = 2**14  # elements of an array that stay in the cache between two operations
+_BLOCK = 2**14  # elements of a part of an array; so many stay in the cache between two operations
 
-ACCEPTED = 5e-14
+MAX_ERROR = 5e-14
 """Backward error above which companion eigenvalues are used."""
-STEPS = 4
-"""Most Newton steps after the closed form; one nearly always suffices."""
+MAX_STEPS = 4
+"""Largest number of Newton steps after the closed form; one step is nearly always enough."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,13 @@ class Factors:
 
     @property
     def roots(self) -> NDArray[np.complex128]:
-        """All roots, shape (…, 4); the two of a factor are adjacent, conjugates exact."""
+        """All roots, shape (…, 4). The roots of a factor are adjacent; complex ones are exact conjugates."""
         return quadratic_roots(self.p, self.q)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Spectral abscissa max Re s and damping ratio min −Re s/|s| over the roots; a root at 0 counts as 0.
+    """Spectral abscissa max Re s and damping ratio min −Re s/|s| over the roots. The damping ratio of a root 0 is 0.
 
     Attributes:
         abscissa, damping_ratio: shape (…); nan for coefficients that are not finite or a leading 0.
@@ -74,7 +74,7 @@ class Motion:
 
 @ignore_option("compiled")
 def quartic_factors(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, a4: ArrayLike) -> Factors:
-    """Real quadratic factors of the quartics a0 s⁴ + … + a4, coefficients of any shapes that broadcast.
+    """Real quadratic factors of the quartics a0 s⁴ + … + a4. The shapes of the coefficients must broadcast.
 
     The factors have a `backward_error` of at most 1e-13, even near exceptional points.
 
@@ -90,7 +90,7 @@ def quartic_factors(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayLike, 
     """
     a, shape = flatten_columns(a0, a1, a2, a3, a4)
     p, q = np.empty((2, a[0].size, 2))
-    fallbacks = _fill((p, q), a, _split_product)
+    fallbacks = _fill_results((p, q), a, _stack_factors)
     return Factors(p.reshape(*shape, 2), q.reshape(*shape, 2), fallbacks)
 
 
@@ -106,9 +106,9 @@ def abscissa_and_damping(a0: ArrayLike, a1: ArrayLike, a2: ArrayLike, a3: ArrayL
     More: docs/how_to/charts.md
     """
     a, shape = flatten_columns(a0, a1, a2, a3, a4)
-    alpha, ratio = np.empty((2, a[0].size))
-    fallbacks = _fill((alpha, ratio), a, _measure)
-    return Motion(alpha.reshape(shape), ratio.reshape(shape), fallbacks)
+    abscissae, ratios = np.empty((2, a[0].size))
+    fallbacks = _fill_results((abscissae, ratios), a, _measure)
+    return Motion(abscissae.reshape(shape), ratios.reshape(shape), fallbacks)
 
 
 def flatten_columns(*coefficients: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
@@ -123,37 +123,38 @@ def flatten_columns(*coefficients: ArrayLike) -> tuple[list[Array], tuple[int, .
 
 def make_blocks(size: int) -> list[slice]:
     """Slices of an array that stay in the cache between two operations."""
-    return [slice(first, first + _BLOCK) for first in range(0, size, _BLOCK)]
+    return [slice(start, start + _BLOCK) for start in range(0, size, _BLOCK)]
 
 
-def _fill(results: Sequence[Array], a: Sequence[Array], finish: Callable[..., tuple[Array, Array]]) -> int:
+def _fill_results(results: Sequence[Array], a: Sequence[Array], finish: Callable[..., tuple[Array, Array]]) -> int:
     """Fill the results from the factors of quartics.
 
     Args:
-        finish: function of the factors and their unit that gives the results.
+        finish: function of the factors p1, q1, p2, q2 and the exponent m of their unit 2^m; it computes
+            the results.
 
     Returns:
         The number of quartics that needed companion eigenvalues.
     """
-    unsolved = [np.empty(0, dtype=int)]
+    unsolved_rows = [np.empty(0, dtype=int)]
     with np.errstate(all="ignore"):  # roots may exceed doubles
         for block in make_blocks(a[0].size):
             monic = factors.monic(*[c[block] for c in a])
-            pq = factors.start(*monic)
+            pq = factors.closed_form_factors(*monic)
             error = factors.error(*monic, *pq)
-            rows = np.flatnonzero(~(error <= GOOD))
+            rows = np.flatnonzero(~(error <= GOOD_ERROR))
             refined, refined_error = np.stack([x[rows] for x in pq]), error[rows]
             _refine(np.stack([b[rows] for b in monic]), refined, refined_error)
             for x, values in zip(pq, refined, strict=True):
                 x[rows] = values
             for result, values in zip(results, finish(*pq, 0), strict=True):
                 result[block] = values
-            unsolved.append(block.start + rows[~(refined_error <= ACCEPTED)])
-        rows = np.concatenate(unsolved)
+            unsolved_rows.append(block.start + rows[~(refined_error <= MAX_ERROR)])
+        rows = np.concatenate(unsolved_rows)
         if not rows.size:
             return 0
-        by_eigenvalues, unit, fallbacks = _factors_by_eigenvalues(np.stack([c[rows] for c in a]))
-        for result, values in zip(results, finish(*by_eigenvalues, unit), strict=True):
+        by_eigenvalues, unit_exponent, fallbacks = _factors_by_eigenvalues(np.stack([c[rows] for c in a]))
+        for result, values in zip(results, finish(*by_eigenvalues, unit_exponent), strict=True):
             result[rows] = values
     return fallbacks
 
@@ -163,45 +164,52 @@ def _refine(b: Array, pq: Array, error: Array) -> None:
     polish(
         pq.T,
         error,
-        lambda trial, rows: np.stack(factors.newton(*b[:, rows], *trial.T), axis=1),
+        lambda trial, rows: np.stack(factors.newton_step(*b[:, rows], *trial.T), axis=1),
         lambda trial, rows: np.asarray(factors.error(*b[:, rows], *trial.T)),
-        STEPS,
+        MAX_STEPS,
     )
 
 
 def _factors_by_eigenvalues(c: Array) -> tuple[Array, NDArray[np.int_], int]:
-    """Factors p1, q1, p2, q2 of quartics with coefficients of shape (5, quartics), in units of 2^unit each.
+    """Factors p1, q1, p2, q2 of quartics with coefficients of shape (5, quartics).
+
+    Each quartic has its own unit 2^m.
 
     Returns:
-        The factors, nan for coefficients that are not finite or a leading 0; the units; the number of other quartics.
+        The factors, which are nan if a coefficient is not finite or the leading one is 0; the exponents m; the
+        number of quartics whose factors are not nan.
     """
-    pq, unit = np.full((4, c.shape[1]), np.nan), np.zeros(c.shape[1], dtype=int)
-    regular = np.flatnonzero(np.all(np.isfinite(c), axis=0) & (c[0] != 0))
-    if regular.size:
-        monic, unit[regular] = _scale_roots(c[:, regular])
+    pq, unit_exponent = np.full((4, c.shape[1]), np.nan), np.zeros(c.shape[1], dtype=int)
+    regular_columns = np.flatnonzero(np.all(np.isfinite(c), axis=0) & (c[0] != 0))
+    if regular_columns.size:
+        monic, unit_exponent[regular_columns] = _scale_roots(c[:, regular_columns])
         z = roots(np.concatenate([np.ones_like(monic[:1]), monic]).T).reshape(-1, 2, 2)
         p, q = -z.sum(axis=2).real, z.prod(axis=2).real
-        pq[:, regular] = p[:, 0], q[:, 0], p[:, 1], q[:, 1]
-    return pq, unit, regular.size
+        pq[:, regular_columns] = p[:, 0], q[:, 0], p[:, 1], q[:, 1]
+    return pq, unit_exponent, regular_columns.size
 
 
 def _scale_roots(c: Array) -> tuple[Array, NDArray[np.int_]]:
-    """Monic coefficients in a unit 2^m near the largest root (Fujiwara); only the division by the lead rounds."""
+    """Monic coefficients in a unit 2^m near the largest root, and m. Only the division by the first coefficient rounds.
+
+    The unit is found from Fujiwara's bound.
+    """
     _, exponent = np.frexp(c)
     power = np.arange(1, 5)[:, None]
     bound = np.where(c[1:] != 0, (exponent[1:] - exponent[0]) / power, -np.inf).max(axis=0)
-    unit = np.where(np.isfinite(bound), np.ceil(bound), 0).astype(int)
+    unit_exponent = np.where(np.isfinite(bound), np.ceil(bound), 0).astype(int)
     lead = np.ldexp(c[0], -exponent[0])
-    return np.ldexp(c[1:], -exponent[0] - unit * power) / lead, unit
+    return np.ldexp(c[1:], -exponent[0] - unit_exponent * power) / lead, unit_exponent
 
 
-def _split_product(p1: Array, q1: Array, p2: Array, q2: Array, unit: Any) -> tuple[Array, Array]:
-    p, q = np.ldexp([p1, p2], unit), np.ldexp([q1, q2], 2 * unit)
+def _stack_factors(p1: Array, q1: Array, p2: Array, q2: Array, unit_exponent: Any) -> tuple[Array, Array]:
+    """p and q of both factors, each of shape (quartics, 2)."""
+    p, q = np.ldexp([p1, p2], unit_exponent), np.ldexp([q1, q2], 2 * unit_exponent)
     return p.T, q.T
 
 
-def _measure(p1: Array, q1: Array, p2: Array, q2: Array, unit: Any) -> tuple[Array, Array]:
+def _measure(p1: Array, q1: Array, p2: Array, q2: Array, unit_exponent: Any) -> tuple[Array, Array]:
     """Abscissa and damping ratio; nan if there are no factors."""
-    alpha = np.maximum(factors.abscissa(p1, q1), factors.abscissa(p2, q2))
-    ratio = np.minimum(factors.damping_ratio(p1, q1), factors.damping_ratio(p2, q2))
-    return np.ldexp(alpha, unit), np.where(np.isnan(alpha), np.nan, ratio)
+    abscissae = np.maximum(factors.abscissa(p1, q1), factors.abscissa(p2, q2))
+    ratios = np.minimum(factors.damping_ratio(p1, q1), factors.damping_ratio(p2, q2))
+    return np.ldexp(abscissae, unit_exponent), np.where(np.isnan(abscissae), np.nan, ratios)
