@@ -274,9 +274,9 @@ def test_the_first_python_example_runs(monkeypatch):
         ("numbers of parameters", "models.exact.MAX_DIGITS problem.units.text.MAX_LENGTH"),
         (
             "CSV files of rows",
-            "studies.files.MAX_FILE_BYTES studies.files.LONGEST_LINE studies.files.MOST_COLUMNS studies.sampling.MOST_ROWS studies.sampling.MOST_NUMBERS",
+            "studies.files.MAX_CSV_BYTES studies.files.MAX_CSV_LINE studies.files.MAX_CSV_COLUMNS studies.sampling.MAX_ROWS studies.sampling.MAX_NUMBERS",
         ),
-        ("a store from another person", "files.MAX_JSON_CHARACTERS studies.store.LARGEST"),
+        ("a store from another person", "files.MAX_JSON_CHARACTERS studies.store.MAX_VALUE_BYTES"),
         ("a chart", "charts.survey.MAX_DESIGNS charts.survey.MAX_TILES"),
     ],
 )

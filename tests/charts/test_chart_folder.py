@@ -347,7 +347,7 @@ def test_a_disk_that_fills_up_keeps_what_is_recorded(tmp_path, monkeypatch, run)
         patch.setattr("tmsopt.charts.folder.os.fsync", full)
         status, _, err = run("chart", *arguments)
     assert status == 2
-    assert "cannot be written: No space left on device; the same command will go on" in err
+    assert "cannot be written: No space left on device; the same command will continue" in err
     with pytest.raises(InputError, match="not finished: 0 of 200"):
         open_chart(path)
     assert run("chart", *arguments)[0] == 0
@@ -431,8 +431,8 @@ def test_three_axes_in_one_file(ending, tmp_path, run):
         ("problems/chart.toml --layers kind,gamma", "found 'gamma'; accepted: kind"),
         ("problems/chart.toml --layer colour", "--layer: found 'colour'; accepted: kind"),
         ("problems/chart.toml --workers 0", "--workers"),
-        ("problems/chart.toml --slice Fr=1", "nothing to hold"),
-        ("problems/ep_set.toml --plot x.png", "hold one, as in --slice"),
+        ("problems/chart.toml --slice Fr=1", "nothing to fix"),
+        ("problems/ep_set.toml --plot x.png", "fix one, as in --slice"),
         ("problems/ep_set.toml --slice mu=1 --plot x.png", "--slice: found 'mu'"),
         ("problems/ep_set.toml --slice Fr=99 --plot x.png", "--slice.Fr: found 99; accepted: "),
         ("problems/ep_set.toml --slice Fr=fast --plot x.png", "--slice.Fr: found 'fast'"),

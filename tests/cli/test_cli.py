@@ -200,7 +200,10 @@ def test_an_answer_that_cannot_be_written_is_no_traceback():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["ep4.toml", "--over", "Fr"], "--over: says what --plot draws over; add --plot FILE, or leave it out\n"),
+        (
+            ["ep4.toml", "--over", "Fr"],
+            "--over: is the horizontal axis of --plot; add --plot FILE, or leave the option out\n",
+        ),
         (
             ["pareto.toml", "--over", "Fr", "--plot", "front.png"],
             "--over: is for one design, and the file asks for a front",
@@ -218,7 +221,7 @@ def test_what_would_have_no_effect_or_no_end_is_refused(run, words, said):
 def test_all_designs_are_not_one(run, option):
     code, out, err = run("solve", "problems/ep4_matching.toml", "--all", option)
     assert (code, out) == (2, "")
-    assert f"{option.partition('=')[0]}: is for one design, and --all looks for all of them" in err
+    assert f"{option.partition('=')[0]}: is for one design, and --all finds all designs" in err
 
 
 MACHINE = """
@@ -287,7 +290,7 @@ def test_a_second_one_or_an_early_one_ends_with_130(monkeypatch, run):
     monkeypatch.setattr(import_module("tmsopt.search.solve"), "_find_best_so_far", stop)
     for command in ("solve", "prove", "compare", "speeds"):
         status, out, err = run(command, "problems/ep4.toml")
-        assert (status, out, err) == (130, "", "stopped; what was printed before stands\n")
+        assert (status, out, err) == (130, "", "stopped; all text printed before is valid\n")
 
 
 @pytest.mark.slow
@@ -322,7 +325,7 @@ def test_the_rows_of_a_study_are_written_in_blocks_as_they_would_be_at_once(run,
     (tmp_path / "s.toml").write_text(text.format(Path("problems/ep4.toml").resolve()))
     written = []
     for size in (3, 100):
-        monkeypatch.setattr(answers, "_BLOCK", size)
+        monkeypatch.setattr(answers, "_ROWS_PER_WRITE", size)
         code, out, _ = run("study", tmp_path / "s.toml", "--json", "--store", tmp_path / "s.sqlite")
         assert code == 0
         written.append(json.loads(out))

@@ -27,7 +27,7 @@ commands = import_module("tmsopt.cli.commands").command_group.commands
 ending = import_module("tmsopt.cli.ending")
 answers = import_module("tmsopt.cli.answers")
 
-STOPPED = "stopped; what was printed before stands\n"
+STOPPED = "stopped; all text printed before is valid\n"
 LONG = 20.0  # seconds, of which a test that passes waits for none
 SOON = 2.0  # seconds in which a command ends
 ONCE, TERM = [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)], (signal.SIGTERM, 143)
@@ -161,7 +161,7 @@ def test_an_interrupt_waits_for_compiled_modules(run, monkeypatch):
         create_module()
         time.sleep(LONG)
 
-    monkeypatch.setattr(ending, "_LOADING", {create_module.__code__})
+    monkeypatch.setattr(ending, "_LOADERS", {create_module.__code__})
     at_work(monkeypatch, work)
     assert run("schema") == (130, "", STOPPED)
 
@@ -195,7 +195,7 @@ def test_a_second_one_ends_what_the_first_has_left(run, monkeypatch):
                 pytest.fail("the second one is no invitation to leave something")
 
     monkeypatch.setattr(ending.Signals, "_exit_soon", lambda self: gone.append(self.status))
-    monkeypatch.setattr(ending, "_AGAIN", 0.0)
+    monkeypatch.setattr(ending, "_REPEAT_SECONDS", 0.0)
     at_work(monkeypatch, work)
     assert run("schema") == (130, "", "")
     assert gone == [130]

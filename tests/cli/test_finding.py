@@ -34,7 +34,7 @@ def test_schema_is_written_once(run, tmp_path):
     file.write_text("mine")
     status, _, err = run("schema", "-o", file)
     assert status == 2
-    assert "is there already" in err
+    assert "exists already" in err
     assert file.read_text() == "mine"
 
 
@@ -55,7 +55,7 @@ def test_a_file_that_is_there_stays_as_it_is(run, tmp_path, arguments):
     file.write_text("mine")
     status, _, err = run(*arguments, file)
     assert status == 2
-    assert "is there already" in err
+    assert "exists already" in err
     assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]
     assert file.read_text() == "mine"
     beside.write_text("mine too")
@@ -97,9 +97,9 @@ def test_a_missing_file_names_three_close_ones_at_most(run, tmp_path, monkeypatc
 @pytest.mark.parametrize(
     ("word", "meant"),
     [
-        ("certify", "; it is tmsopt solve FILE --certify\n"),
-        ("pareto", '; it is tmsopt solve FILE, with pareto = ["abscissa", "Fr"] under [objective] of FILE\n'),
-        ("growth", "; it is tmsopt solve FILE --plot growth.png\n"),
+        ("certify", "; use tmsopt solve FILE --certify\n"),
+        ("pareto", '; use tmsopt solve FILE, with pareto = ["abscissa", "Fr"] under [objective] of FILE\n'),
+        ("growth", "; use tmsopt solve FILE --plot growth.png\n"),
     ],
 )
 def test_a_word_that_is_no_command_is_answered_by_what_it_means(run, word, meant):

@@ -63,8 +63,8 @@ COMMANDS = {
     "solve": ("solve {p}/realistic.toml", {"looking at designs", "searching", "looking for the nearest boundaries"}),
     "certify": ("solve {p}/realistic.toml --json --certify 2", {"searching", "bounding the optimum"}),
     "full": ("solve {p}/realistic.toml --full", {"moving limits", "splitting roots"}),
-    "plot": ("solve {p}/ep4.toml --plot growth.png", {"following the roots", "writing what --plot asks for"}),
-    "report": ("solve {p}/ep4.toml --report page.html", {"writing what --report asks for", "writing the page"}),
+    "plot": ("solve {p}/ep4.toml --plot growth.png", {"following the roots", "writing the file of --plot"}),
+    "report": ("solve {p}/ep4.toml --report page.html", {"writing the file of --report", "writing the page"}),
     "all": ("solve {p}/ep4_matching.toml --all", {"proving that no design is missed"}),
     "infeasible": ("solve infeasible.toml --starts 4", {"searching for the smallest change of limits"}),
     "front": ("solve {p}/pareto.toml --points 3", {"following the front"}),
@@ -74,7 +74,7 @@ COMMANDS = {
     "monte carlo": ("study built.toml", {"searching", "solving rows"}),
     "figure": ("figure growth --output growth.png", {"drawing"}),
     "prove": ("prove {p}/ep4.toml", {"searching", "proving to 30 digits"}),
-    "explore": ("explore {p}/ep4.toml -o page.html", {"looking for designs worth going to", "writing the page"}),
+    "explore": ("explore {p}/ep4.toml -o page.html", {"looking for other designs", "writing the page"}),
     "compare": ("compare {p}/ep4.toml", {"searching", "comparing"}),
     "diagnose": ("diagnose {p}/ep4.toml", {"searching", "splitting roots"}),
     "simulate": ("simulate {p}/realistic.toml", {"searching", "following the motion"}),
@@ -158,7 +158,7 @@ def test_ctrl_c_is_answered_with_a_line(text, tmp_path):
     what = {"trace": "tracing", "verify": "recomputing"}.get(text.split(maxsplit=1)[0], "looking at designs")
     seen = on_a_terminal(text.format(p=PROBLEMS).split(), tmp_path, SLOW_AT_WORK, stop=what)
     assert seen.status == 130
-    assert seen.screen == "stopped; what was printed before stands\n"
+    assert seen.screen == "stopped; all text printed before is valid\n"
 
 
 @pytest.mark.slow

@@ -86,4 +86,4 @@ def test_json_alone_is_no_option_of_the_whole(run, words):
 
 def test_the_help_says_what_json_is_for(run):
     help_ = " ".join(run("--help")[1].split())
-    assert "--json With --version: also those of Python and the libraries" in help_
+    assert "--json With --version: also show the versions of the libraries" in help_

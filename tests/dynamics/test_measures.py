@@ -281,7 +281,7 @@ def test_the_command_answers_in_json():
         ("{p}/ep4.toml --start phi", 2, "--start: found 'phi'; accepted: NAME=VALUE, such as phidot=0.1"),
         ("{p}/ep4.toml --start phi=x", 2, "--start.phi: found 'x'; accepted: a number"),
         ("{p}/ep4.toml --csv motion.txt", 2, "--csv: found 'motion.txt'; accepted: a file name ending in csv"),
-        ("{p}/ep4.toml --path", 2, "--path: says what --csv writes; add --csv FILE"),
+        ("{p}/ep4.toml --path", 2, "--path: changes what --csv writes; add --csv FILE"),
         ("{p}/ziegler.toml --push 1", 2, "push: a stated system has no lean and no steer"),
         ("{p}/none.toml", 2, "no such file"),
     ],
@@ -303,7 +303,7 @@ def test_without_a_design_there_is_no_motion(tmp_path):
     file.write_text((PROBLEMS / "ep4.toml").read_text() + '[constraints]\ndecay = "abscissa <= -100"\n')
     code, out, err = run("simulate", str(file))
     assert (code, out) == (3, "")
-    assert err.endswith("infeasible; there is no design to look at\n")
+    assert err.endswith("infeasible; there is no design to examine\n")
 
 
 def test_the_default_and_units_are_said():

@@ -40,7 +40,7 @@ from tmsopt.plots.paper import (
     draw_law,
     draw_row,
     draw_section,
-    find,
+    find_item,
     full_window,
 )
 from tmsopt.records import Table
@@ -337,7 +337,7 @@ def test_drawn_paths_are_those_of_table_1():
 
 
 def test_list_and_names():
-    assert find("fig3") is find("root-locus") is GALLERY["root-locus"]
+    assert find_item("fig3") is find_item("root-locus") is GALLERY["root-locus"]
     listed = json.loads(CliRunner().invoke(main, ["figure", "--list", "--json"]).stdout)["figures"]
     assert {"bicycle", "growth", "root-locus", "experiment", "universal"} <= {item["name"] for item in listed}
     assert {item["alias"] for item in listed} >= {"figTMS", "fig0", "fig3", "fige"}

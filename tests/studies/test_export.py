@@ -247,7 +247,7 @@ def test_heads_of_csv_name_units():
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
 def test_rows_are_counted_while_they_are_written(ending, tmp_path, monkeypatch):
-    monkeypatch.setattr(import_module("tmsopt.studies.export"), "BLOCK", 2)
+    monkeypatch.setattr(import_module("tmsopt.studies.export"), "CHUNK_ROWS", 2)
     monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
     told = []
     export(table_of(*map(solved, range(5))), tmp_path / f"x.{ending}", progress=told.append)

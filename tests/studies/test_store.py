@@ -23,7 +23,16 @@ from helpers.works import little_room
 from tmsopt.models import tms
 from tmsopt.problem import Problem, load
 from tmsopt.records import Table
-from tmsopt.studies import RowTable, Study, batch_rows, check_same, open_store, read_results, run_study, view_store
+from tmsopt.studies import (
+    RowTable,
+    Study,
+    batch_rows,
+    check_same_study,
+    open_store,
+    read_results,
+    run_study,
+    view_store,
+)
 
 SPECIAL = (math.nan, math.inf, -math.inf, 0.0, 5e-324, -2.2250738585072011e-308, 1.7976931348623157e308, 0.1)
 OLD = Path(__file__).parent / "stores"
@@ -343,7 +352,7 @@ def test_a_spoiled_store_is_refused_and_moved_aside_by_fresh(script, path):
     """Nothing of it is run or believed."""
 
     def read_whole():
-        check_same(path, STUDY)
+        check_same_study(path, STUDY)
         with view_store(path) as opened:
             opened.about(), opened.sessions(), opened.read_batches()
 

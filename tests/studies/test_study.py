@@ -374,11 +374,11 @@ def test_the_command_writes_no_file_twice_and_none_that_it_reads(tmp_path, monke
     shutil.copy(Path(__file__).parents[2] / "problems" / "ep4.toml", "other.toml")
     Path("rows.toml").write_text(text, encoding="utf-8")
     for words, said in [
-        (("--store", "s.csv", "--export", "./s.csv"), "--export: 's.csv' is what --store writes"),
-        (("--store", "s.html", "--report", "s.html"), "--report: 's.html' is what --store writes"),
-        (("--export", "s.csv", "--export", "s.csv"), "--export: 's.csv' is what --export writes"),
-        (("--export", "own.csv"), "--export: 'own.csv' is what the study is read from"),
-        (("--store", "other.toml"), "--store: 'other.toml' is what the study is read from"),
+        (("--store", "s.csv", "--export", "./s.csv"), "--export: 's.csv' is the file that --store writes"),
+        (("--store", "s.html", "--report", "s.html"), "--report: 's.html' is the file that --store writes"),
+        (("--export", "s.csv", "--export", "s.csv"), "--export: 's.csv' is the file that --export writes"),
+        (("--export", "own.csv"), "--export: 'own.csv' is a file of the study"),
+        (("--store", "other.toml"), "--store: 'other.toml' is a file of the study"),
     ]:
         refused = command("rows.toml", *words)
         assert (refused.exit_code, refused.stderr.strip()) == (2, f"{said}; give another name")
@@ -429,7 +429,7 @@ def test_a_killed_command_goes_on(file, ending):
     answer, told = process.communicate(timeout=60)
     if ending == signal.SIGINT:
         assert process.returncode == 130
-        assert "the same command goes on" in told
+        assert "the same command continues" in told
         assert "Traceback" not in told
         data = json.loads(answer)
         assert data["run"] == {"store": str(store), "rows_found": 0, "interrupted": True}

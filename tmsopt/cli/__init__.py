@@ -32,12 +32,12 @@ def main(args: "Sequence[str] | None" = None, prog_name: str | None = None) -> "
         if not ONE_THREAD.keys() & os.environ:
             os.environ.update(ONE_THREAD)
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            signal.signal(signal.SIGINT, signal.SIG_DFL)  # as for SIGTERM, until the other modules are loaded
+            signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends the process, until the other modules are loaded
     from tmsopt.cli.ending import exit_now, handle_signals, open_streams, report_end
     from tmsopt.cli.terminal import show_progress
 
     status: int | str | None = 0
-    with handle_signals(for_good=args is None) as signals:
+    with handle_signals(ends_process=args is None) as signals:
         try:
             with open_streams() as terminal, report_end(), show_progress(terminal):
                 from tmsopt.cli.commands import command_group

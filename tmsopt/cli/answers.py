@@ -1,6 +1,6 @@
-"""Answers: JSON or text on stdout, laid out for the terminal or pipe that reads it, and the files that options name.
+"""Answers of commands: JSON or text on stdout, laid out for a terminal or a pipe, and the files that options name.
 
-A file name is checked before any work is done. A file is written completely or not at all, and named on stderr.
+A file name is checked before any work is done. A file is written completely or not at all; its name goes to stderr.
 """
 
 import json
@@ -22,14 +22,18 @@ from tmsopt.cli.terminal import count_columns, hide_progress, progress_listener,
 from tmsopt.errors import input_error
 from tmsopt.files import read_text, write_text
 
-FIGURES, PAGES = ("png", "pdf", "svg"), ("html", "htm")
-"""Endings of figures, and of pages for a browser."""
+FIGURE_ENDINGS = ("png", "pdf", "svg")
+"""Endings of the file names of figures."""
 
-WORDS = "tmsopt.words"
-"""Key of the words of the command line in the `meta` of click's context."""
+PAGE_ENDINGS = ("html", "htm")
+"""Endings of the file names of pages for a browser."""
 
-_PIPE_COLUMNS, _MIN_COLUMNS, _MAX_COLUMNS = 100, 40, 160  # columns in a pipe; limits of those in a terminal
-_BLOCK = 5000  # number of JSON rows that are made and written at once
+WORDS_KEY = "tmsopt.words"
+"""Key under which the `meta` of click's context has the words of the command line."""
+
+_PIPE_COLUMNS = 100  # width of lines in a pipe
+_MIN_COLUMNS, _MAX_COLUMNS = 40, 160  # limits of the width of lines in a terminal
+_ROWS_PER_WRITE = 5000  # number of JSON rows that are formatted and written at once
 _REPORT_LETTERS = "√±×…−ωε"  # letters of reports that some encodings lack
 
 
@@ -41,10 +45,11 @@ class Reply:
         result: a result, or a text.
         status: exit status.
         data: the JSON; by default the `to_json` of the result.
-        level: level of the document and the page of the result, brief or full.
-        draw, write_csv: make the figure and the table; by default `plot` and `write_csv` of the result.
+        level: how much the document and the page of the result show, brief or full.
+        draw: makes the figure; by default `plot` of the result.
+        write_csv: writes the table; by default `write_csv` of the result.
         page: options of `tmsopt.save_report`.
-        content: printed instead of the result: its document, or a list of results and texts.
+        content: what is printed instead of the result: its document, or a list of results and texts.
         skipped_options: names of options, separated by blanks, whose files are not written.
     """
 
@@ -67,12 +72,16 @@ def deliver(command: Any, reply: Reply) -> int:
 
 
 def write_files(command: Any, reply: Reply, *files: Path) -> None:
-    """Write the files that the options of a command name; `files` contain its problem, by default FILE."""
+    """Write the files that the options of a command name.
+
+    Args:
+        files: the files with the problem, by default FILE.
+    """
     result = reply.result
 
     def save_page(path: Path) -> None:
         texts = {file.name: read_text(str(file), "TOML problem file") for file in files or [command.file]}
-        line = shlex.join(["tmsopt", *click.get_current_context().meta.get(WORDS, ())])
+        line = shlex.join(["tmsopt", *click.get_current_context().meta.get(WORDS_KEY, ())])
         seed = {"seed": command.seed} if hasattr(command, "seed") else {}
         is_full, progress = reply.level == "full", progress_listener()
         tmsopt.save_report(
@@ -117,8 +126,8 @@ def lay_out(document: Any) -> str:
     width = min(max(count_columns(sys.stdout), _MIN_COLUMNS), _MAX_COLUMNS) if sys.stdout.isatty() else _PIPE_COLUMNS
     if isinstance(document, str):
         return document if "\n" in document else "\n".join(wrap(document, width))
-    encoded = _REPORT_LETTERS.encode(sys.stdout.encoding or "utf-8", "ignore")
-    return to_text(document, width, is_coloured(), len(encoded) < len(_REPORT_LETTERS))
+    kept_letters = _REPORT_LETTERS.encode(sys.stdout.encoding or "utf-8", "ignore")
+    return to_text(document, width, is_coloured(), ascii_only=len(kept_letters) < len(_REPORT_LETTERS))
 
 
 def is_coloured() -> bool:
@@ -146,8 +155,8 @@ def answer_rows(data: dict[str, Any], key: str, rows: Sequence[Any]) -> None:
     head, row_list, tail = format_json(data).partition(f'\n  "{key}": [')
     with hide_progress() if sys.stdout.isatty() else nullcontext():
         click.echo(head + row_list, nl=False)
-        for first in range(0, len(rows), _BLOCK):
-            block = [row.to_json() for row in rows[first : first + _BLOCK]]
+        for first in range(0, len(rows), _ROWS_PER_WRITE):
+            block = [row.to_json() for row in rows[first : first + _ROWS_PER_WRITE]]
             text = format_json(block)[1:-2].replace("\n", "\n  ")  # without brackets, and indented
             click.echo("," * (first > 0) + text, nl=False)
         click.echo("\n  " * bool(rows) + tail)
@@ -161,23 +170,23 @@ def check_output(option: str, path: Path | None, endings: Sequence[str]) -> None
     if ending not in endings:
         raise input_error(f"found '{path}'; accepted: a file name ending in {', '.join(endings)}", option)
     try:
-        problem = "is a directory" if path.is_dir() and ending != "chart" else ""
-        problem = problem or ("" if path.parent.is_dir() else "is in a directory that does not exist")
+        reason = "is a directory" if path.is_dir() and ending != "chart" else ""
+        reason = reason or ("" if path.parent.is_dir() else "is in a directory that does not exist")
     except OSError as error:  # the name is longer than the file system allows
-        problem = f"is no name for a file here ({error.strerror})"
-    if problem:
-        raise input_error(f"'{path}' {problem}; give the path of a file to write", option)
+        reason = f"is not accepted as a file name here ({error.strerror})"
+    if reason:
+        raise input_error(f"'{path}' {reason}; give the path of a file to write", option)
 
 
 @contextmanager
 def report_writing(option: str, path: Path) -> Iterator[None]:
     """Name the file that was written; if it could not be written, say why and exit with status 2."""
-    show_step(f"writing what {option} asks for")
+    show_step(f"writing the file of {option}")
     try:
         yield
     except OSError as error:
         exists = isinstance(error, FileExistsError)
-        reason = "is there already; give another name" if exists else f"cannot be written: {error.strerror or error}"
+        reason = "exists already; give another name" if exists else f"cannot be written: {error.strerror or error}"
         click.echo(f"{option}: '{path}' {reason}", err=True)
         sys.exit(BAD_INPUT)
     click.echo(f"wrote {path}", err=True)
@@ -191,15 +200,17 @@ def write_file(option: str, path: Path | None, write: Callable[[Path], object]) 
 
 
 def write_new(option: str, path: Path, text: str) -> None:
-    """Write a new file, and the files that a problem refers to if they do not exist; a folder is named once."""
+    """Write a new file, and the files that a problem refers to if they do not exist.
+
+    The message on stderr names a folder once, even if several files are written to it."""
     from tmsopt.guide import companions
 
     companion_texts = companions(text) if path.suffix == ".toml" else {}
     files = {path: text} | {
         f: companion for n, companion in companion_texts.items() if not (f := path.parent / n).exists()
     }
-    for place, group in groupby(files, lambda file: file if file.parent == path.parent else file.parent):
-        with report_writing(option, place):
+    for named_path, group in groupby(files, lambda file: file if file.parent == path.parent else file.parent):
+        with report_writing(option, named_path):
             for file in group:
                 file.parent.mkdir(exist_ok=True)
                 write_text(file, files[file], must_be_new=True)

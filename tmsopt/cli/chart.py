@@ -26,7 +26,7 @@ def _parse_points(text: str) -> tuple[int, ...]:
     try:
         return tuple(map(int, text.replace("×", "x").split("x")))
     except ValueError:
-        message = f"found {text!r}; accepted: a number from 2, or two or three as in 400x300"
+        message = f"found {text!r}; accepted: one to three numbers of at least 2, as in 400x300"
         raise click.BadParameter(message) from None
 
 
@@ -42,20 +42,20 @@ class ChartCommand(WithPage, WithPlot, OnFile):
     Exit status: 0 done, 2 bad input.
     """
 
-    points: Any = option("Points.  [default: 400x300, 120x100x80]", type=_parse_points, metavar="N[xM[xL]]")
-    axes: Any = option("Parameters, the horizontal one first.", type=split_names, metavar="NAMES")
+    points: Any = option("Points.  [default: 400x300 or 120x100x80]", type=_parse_points, metavar="N[xM[xL]]")
+    axes: Any = option("Axes, the horizontal one first.", type=split_names, metavar="NAMES")
     output: Path | None = option("Write the arrays (npz, nc, chart).", None, "-o", endings=("npz", "nc", "chart"))
-    layers: Any = option("Arrays of --output, e.g. kind,abscissa.", type=split_names, metavar="NAMES")
+    layers: Any = option("Arrays in --output, e.g. kind,abscissa.", type=split_names, metavar="NAMES")
     quantity: Mapping[str, str] = option(
-        "Compute an expression too.", metavar="NAME=EXPRESSION", example="excess=Fr - Fr_c"
+        "Also compute an expression.", metavar="NAME=EXPRESSION", example="excess=Fr - Fr_c"
     )
     single: bool = option("Write numbers in single precision.")
-    fresh: bool = option("Move the folder of --output aside.")
+    fresh: bool = option("Start anew; rename an old --output folder.")
     engine: str | None = option("", hidden=True)
-    workers: int = option("Processes.", 1, type=click.IntRange(1, 256))
+    workers: int = option("Number of processes.", 1, type=click.IntRange(1, 256))
     layer: str = option("Layer that --plot shows.", "kind")
     slice: Mapping[str, str] = option(
-        "Parameter of three that --plot holds.", metavar="NAME=VALUE", example="lambda_s=0.4", multiple=False
+        "Fix one of three parameters for --plot.", metavar="NAME=VALUE", example="lambda_s=0.4", multiple=False
     )
     boundaries: bool = option("Trace the boundaries exactly.", True)
 
@@ -67,7 +67,7 @@ class ChartCommand(WithPage, WithPlot, OnFile):
             return self._chart(folder)
         except KeyboardInterrupt:
             is_kept = folder is not None and folder.exists()
-            text = f"the tiles done so far are in {folder}; the same command goes on"
+            text = f"the tiles done so far are in {folder}; the same command continues the work"
             click.echo(f"stopped: {text if is_kept else 'nothing was written'}", err=True)
             sys.exit(INTERRUPTED)
 
@@ -78,7 +78,7 @@ class ChartCommand(WithPage, WithPlot, OnFile):
             check_netcdf()
         problem = take_nominal(tmsopt.load(self.file).posed)
         names, layers = axes_of(problem, self.axes), self.layers or DEFAULT_LAYERS
-        is_whole = folder is None and len(names) == 2  # in memory, with all layers and boundaries
+        is_plane_in_memory = folder is None and len(names) == 2  # such a chart has all layers and boundaries
         self._check_plot(len(names))
         slice_values = self._read_slice(problem)
         options: dict[str, Any] = {"quantities": self.quantity, "single": self.single, "progress": progress_listener()}
@@ -88,10 +88,10 @@ class ChartCommand(WithPage, WithPlot, OnFile):
                 names,
                 folder=folder,
                 points=self.points * len(names) if self.points and len(self.points) == 1 else self.points,
-                layers=(*_LAYERS, *layers) if is_whole else layers,
+                layers=(*_LAYERS, *layers) if is_plane_in_memory else layers,
                 workers=self.workers,
                 fresh=self.fresh,
-                boundaries=self.boundaries and is_whole,
+                boundaries=self.boundaries and is_plane_in_memory,
                 **options,
             )
         if folder is None:
@@ -99,20 +99,22 @@ class ChartCommand(WithPage, WithPlot, OnFile):
 
         def draw() -> Any:
             figure_options = options | {"boundaries": self.boundaries}
-            figure_chart = chart if is_whole else tmsopt.chart(**_cut_plane(chart, slice_values), **figure_options)
+            figure_chart = (
+                chart if is_plane_in_memory else tmsopt.chart(**_cut_plane(chart, slice_values), **figure_options)
+            )
             return tmsopt.plots.chart_figure(figure_chart, self.layer)
 
         return Reply(chart, draw=draw)
 
-    def _check_plot(self, axes: int) -> None:
+    def _check_plot(self, axis_count: int) -> None:
         accepted = (*_LAYERS[:4], *self.quantity)
         if self.layer not in accepted:
             raise input_error(f"found '{self.layer}'; {suggest(self.layer, accepted)}", "--layer")
-        if self.plot is not None and axes == 3 and not self.slice:
-            message = "three parameters are free, and a figure shows two; hold one, as in --slice lambda_s=0.4"
+        if self.plot is not None and axis_count == 3 and not self.slice:
+            message = "three parameters are free, and a figure shows two; fix one, as in --slice lambda_s=0.4"
             raise input_error(message, "--plot")
-        if self.slice and axes == 2:
-            raise input_error("two parameters are free, so there is nothing to hold; leave it out", "--slice")
+        if self.slice and axis_count == 2:
+            raise input_error("two parameters are free, so there is nothing to fix; leave the option out", "--slice")
 
     def _read_slice(self, problem: Any) -> dict[str, float]:
         """The value at which --slice fixes a parameter, checked against its range."""
@@ -129,12 +131,12 @@ class ChartCommand(WithPage, WithPlot, OnFile):
 
 @contextmanager
 def _report_folder(folder: Path) -> Iterator[None]:
-    """Name the folder that was written, and the place of an old one; if it could not be written, say why."""
+    """Name the folder that was written, and the new name of an old one; if it could not be written, say why."""
     old_folders = {folder, *folder.parent.glob("*.chart")}
     try:
         yield
     except OSError as error:
-        message = f"'{folder}' cannot be written: {error.strerror}; the same command will go on where it was"
+        message = f"'{folder}' cannot be written: {error.strerror}; the same command will continue the work"
         raise input_error(message, "--output") from None
     for moved_folder in sorted(set(folder.parent.glob("*.chart")) - old_folders):
         click.echo(f"moved the old folder to {moved_folder}", err=True)
@@ -142,7 +144,7 @@ def _report_folder(folder: Path) -> Iterator[None]:
 
 
 def _cut_plane(chart: Any, slice_values: dict[str, float]) -> dict[str, Any]:
-    """Arguments of the chart in a figure: the parameter of --slice is fixed, and there are fewer points."""
+    """Arguments of `tmsopt.chart` for the figure: the parameter of --slice is fixed, and there are fewer points."""
     problem, sizes = chart.problem, dict(zip(chart.axes, map(len, chart.grid), strict=True))
     title = ", ".join([problem.title, *(f"{n} = {v:.6g}" for n, v in slice_values.items())]).removeprefix(", ")
     free = {n: ends for n, ends in problem.free.items() if n not in slice_values}

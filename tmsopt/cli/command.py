@@ -9,7 +9,7 @@ from typing import Any, Literal, dataclass_transform, get_args, get_origin
 
 import click
 
-from tmsopt.cli.answers import FIGURES, PAGES, Reply, check_output, deliver
+from tmsopt.cli.answers import FIGURE_ENDINGS, PAGE_ENDINGS, Reply, check_output, deliver
 from tmsopt.cli.terminal import progress_listener
 from tmsopt.errors import MOST_STARTS, Fault, InputError, input_error
 
@@ -26,8 +26,8 @@ def option(text: str, default: Any = None, *names: str, **settings: Any) -> Any:
 
     Args:
         text: its help.
-        names: further names.
-        settings: the `endings` of a file to write; an `example` of NAME=VALUE; or settings of `click.Option`, such as
+        names: further names of the option.
+        settings: the `endings` of a file to write, an `example` of NAME=VALUE, or settings of `click.Option`, such as
             the `type`, which is a range of numbers or a function that parses the text.
     """
     return field(default=default, metadata={"help": text, "names": names, **settings})
@@ -52,12 +52,12 @@ class Command:
         """Refuse options that have no effect.
 
         Args:
-            checks: whether options have no effect, their names, and what to do.
+            checks: in each check, whether options have no effect, their names with blanks between, and what to do.
 
         Raises:
             InputError: with a fault for each of these options.
         """
-        advice = {name: text for useless, names, text in checks if useless for name in names.split()}
+        advice = {name: text for is_useless, names, text in checks if is_useless for name in names.split()}
         if faults := [Fault(advice[n], (_make_flag(n),)) for n, value in vars(self).items() if n in advice and value]:
             raise InputError(faults)
 
@@ -67,12 +67,12 @@ class OnFile(Command):
 
 
 class WithPlot(Command):
-    plot: Path | None = option("Draw it (png, pdf, svg).", endings=FIGURES)
+    plot: Path | None = option("Draw the result (png, pdf, svg).", endings=FIGURE_ENDINGS)
     json: bool = option("Write JSON to stdout instead of text.")
 
 
 class WithPage(Command):
-    report: Path | None = option("Write a page with pictures (html).", endings=PAGES)
+    report: Path | None = option("Write a web page with pictures (html).", endings=PAGE_ENDINGS)
 
 
 class WithCsv(Command):
@@ -80,7 +80,7 @@ class WithCsv(Command):
 
 
 class WithSearch(Command):
-    starts: int | None = option("Most starts to try.  [default: 64]", type=click.IntRange(1, MOST_STARTS))
+    starts: int | None = option("Largest number of starts.  [default: 64]", type=click.IntRange(1, MOST_STARTS))
     seed: int = option("Seed of the starts.", 0, type=click.IntRange(0))
 
     @property
@@ -118,14 +118,14 @@ def take_nominal(problem: Any) -> Any:
     """The problem at its nominal values; a note on stderr says that scenarios and tolerances are left out."""
     if problem.nominal is not problem:
         values = _list_scenarios(problem)
-        click.echo(f"scenarios and tolerances are left aside{': ' + values if values else ''}", err=True)
+        click.echo(f"scenarios and tolerances are ignored{'; values used: ' + values if values else ''}", err=True)
     return problem.nominal
 
 
 def note_scenarios(problem: Any, varied: Iterable[str] = ()) -> None:
-    """Say on stderr for which scenario a design is examined, if it was found for several."""
+    """If a design was found for several scenarios, say on stderr for which one it is examined."""
     if values := _list_scenarios(problem, varied):
-        click.echo(f"the design for all scenarios, looked at for {values}", err=True)
+        click.echo(f"the design is for all scenarios; it is examined for {values}", err=True)
 
 
 def _list_scenarios(problem: Any, varied: Iterable[str] = ()) -> str:
@@ -157,9 +157,9 @@ def build_command(kind: type[Command], name: str) -> click.Command:
             sys.exit(status)
 
     def name_option(fault: Fault) -> Fault:
-        """A fault of an argument of the library, with the option of this argument as its key."""
-        first, *rest = fault.key or ("",)
-        return replace(fault, key=(_make_flag(first), *rest)) if first in options and not fault.file else fault
+        """A fault whose key is the option for an argument, instead of the name of the argument."""
+        name, *rest = fault.key or ("",)
+        return replace(fault, key=(_make_flag(name), *rest)) if name in options and not fault.file else fault
 
     summary, _, epilog = (getdoc(kind) or "").partition("\n\n")
     parameters = [*map(_build_parameter, command_fields), colour_option()]
@@ -169,23 +169,23 @@ def build_command(kind: type[Command], name: str) -> click.Command:
 def colour_option() -> click.Option:
     """The option --color, for each command and for the group of all commands."""
 
-    def keep(context: click.Context, _: click.Parameter, value: str | None) -> None:
+    def set_colour(context: click.Context, _: click.Parameter, value: str | None) -> None:
         if value:
             context.color = {"always": True, "never": False}.get(value)
 
     choices, text = click.Choice(["auto", "always", "never"]), "Colour the text.  [default: auto]"
-    return click.Option(["--color"], type=choices, callback=keep, expose_value=False, help=text)
+    return click.Option(["--color"], type=choices, callback=set_colour, expose_value=False, help=text)
 
 
 class _Option(click.Option):
-    """An option whose help does not show its range; the message about a number outside the range does."""
+    """An option whose help does not show its range; the message about a number outside the range shows it."""
 
     def get_help_extra(self, ctx: click.Context) -> Any:
         return {key: value for key, value in super().get_help_extra(ctx).items() if key != "range"}
 
 
 class _Command(click.Command):
-    """A command whose help shows the examples without changes of their lines."""
+    """A command whose help keeps the lines of the examples."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         text = (self.epilog or "").replace("\n\nExit", "\nExit")

@@ -12,20 +12,20 @@ from typing import Any
 import click
 
 from tmsopt import __version__
-from tmsopt.cli.answers import WORDS, answer
+from tmsopt.cli.answers import WORDS_KEY, answer
 from tmsopt.cli.command import build_command, colour_option
 from tmsopt.cli.ending import BAD_INPUT, STATUSES, report_end
 from tmsopt.errors import InputError
 
 _MODULES: Mapping[str, Mapping[str, str]] = {
     "designs": {
-        "solve": "Find the best design, or the front of the best ones.",
+        "solve": "Find the best design, or a Pareto front.",
         "explore": "Write a page with sliders that shows why a design is stable.",
         "compare": "Compare the optimum with the closed-form laws.",
-        "prove": "Prove that the solution exists, and whether it is stable.",
+        "prove": "Prove that the solution exists, and decide if it is stable.",
         "diagnose": "Show how each multiple root splits.",
         "speeds": "Find every weave and capsize speed.",
-        "simulate": "Show the motion after a lean, a push, or in noise.",
+        "simulate": "Show the motion after a lean or a push, or under noise.",
         "trace": "Trace a root pattern through parameter space.",
     },
     "chart": {"chart": "Chart stability over two or three parameters."},
@@ -34,10 +34,10 @@ _MODULES: Mapping[str, Mapping[str, str]] = {
         "figure": "Draw the figures of the paper.",
         "verify": "Recompute every number of the paper.",
         "import": "Make a problem file from a measured bicycle.",
-        "convert": "Make a bicycle with inertia from one of point masses.",
+        "convert": "Make bodies with moments of inertia from point masses.",
         "new": "Write a commented problem to start from.",
         "example": "List the examples that come with tmsopt, or write one here.",
-        "describe": "Show what a model or a file is made of.",
+        "describe": "Show the symbols and units of a model or a file.",
         "schema": "Write the JSON Schema of problem files, for editors.",
     },
 }
@@ -45,19 +45,20 @@ _MODULES: Mapping[str, Mapping[str, str]] = {
 
 _MODULE_OF_COMMAND = {name: module for module, names in _MODULES.items() for name in names}
 
-_FRONT = 'tmsopt solve FILE, with pareto = ["abscissa", "Fr"] under [objective] of FILE'
+_FRONT_HINT = 'tmsopt solve FILE, with pareto = ["abscissa", "Fr"] under [objective] of FILE'
 _HINTS = {
-    **{"certify": "tmsopt solve FILE --certify", "pareto": _FRONT, "front": _FRONT},
+    **{"certify": "tmsopt solve FILE --certify", "pareto": _FRONT_HINT, "front": _FRONT_HINT},
     **dict.fromkeys(("growth", "plot"), "tmsopt solve FILE --plot growth.png"),
     **dict.fromkeys(("explain", "robustness"), "tmsopt solve FILE --full"),
 }
-"""Name that is no command, but a function of the library or an option → the command that does the same."""
+"""Name of a function of the library, or of an option, but not of a command → the command that does the same."""
 
 _STATUSES = """
 Exit status:
-  0 done, 1 a fault of tmsopt itself, 2 bad input or a file that cannot be
+  0 done, 1 an error in tmsopt itself, 2 bad input or a file that cannot be
   written, 3 infeasible or nothing found, 4 not converged or not proved, 130
-  stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP, 141 the reader is gone
+  stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP, 141 the program that
+  reads the output has ended
 
 More: docs/reference/commands.md
 """
@@ -101,12 +102,12 @@ class _Group(click.Group):
                     raise click.UsageError(f"found {word!r}; accepted: {accepted}")
             words = tuple(args)  # copied, because click removes them from the list
             context = super().make_context(info_name, args, *arguments, **extra)
-            context.meta[WORDS] = words
+            context.meta[WORDS_KEY] = words
             return context
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[Any, ...]:
         if args[0] in _HINTS and not ctx.resilient_parsing:
-            ctx.fail(f"No such command {args[0]!r}; it is {_HINTS[args[0]]}")
+            ctx.fail(f"No such command {args[0]!r}; use {_HINTS[args[0]]}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -124,11 +125,11 @@ class _Group(click.Group):
                 click.echo(f"{error}{_offer_example(error)}", err=True)
                 sys.exit(BAD_INPUT)
             except RuntimeError as error:
-                solution = getattr(error, "solution", None)  # NotSolved has it; importing that class takes long
+                solution = getattr(error, "solution", None)  # of NotSolved; importing that class takes long
                 if solution is None:
                     raise
                 status = solution.status.replace("_", " ")
-                click.echo(f"{solution.problem.title}: {status}; there is no design to look at", err=True)
+                click.echo(f"{solution.problem.title}: {status}; there is no design to examine", err=True)
                 sys.exit(STATUSES[solution.status])
 
 
@@ -156,7 +157,7 @@ def _offer_example(error: InputError) -> str:
     subcommand_metavar="COMMAND [ARGS]...",
 )
 @click.option("--version", is_flag=True, help="Show the version and exit.")
-@click.option("--json", is_flag=True, help="With --version: also those of Python and the libraries.")
+@click.option("--json", is_flag=True, help="With --version: also show the versions of the libraries.")
 @click.pass_context
 def command_group(ctx: click.Context, version: bool, json: bool) -> None:
     """Design self-stable bicycles under your own constraints, and find exceptional points.

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 import tmsopt
-from tmsopt.cli.answers import PAGES, Reply, check_output, make_document, report_writing
+from tmsopt.cli.answers import PAGE_ENDINGS, Reply, check_output, make_document, report_writing
 from tmsopt.cli.command import (
     OnFile,
     WithCsv,
@@ -36,11 +36,11 @@ _KEYS = (
 )
 """Keys of the JSON without --full, which other programs rely on."""
 
-_FRONT = "is for one design, and the file asks for a front; write minimize with one of the expressions"
-_NO_FRONT = 'is for a front; write pareto = ["abscissa", "Fr"] under [objective], or leave the option out'
-_ALL = "is for one design, and --all looks for all of them; leave one of the two out"
-_SCALED = "scales one design, and the file asks for a front; write the problem in SI instead"
-_NOT_SCALED = "scales a dimensionless bicycle, and the file is not one; leave it out"
+_NOT_FOR_A_FRONT = "is for one design, and the file asks for a front; write minimize with one of the expressions"
+_ONLY_FOR_A_FRONT = 'is for a front; write pareto = ["abscissa", "Fr"] under [objective], or leave the option out'
+_NOT_WITH_ALL = "is for one design, and --all finds all designs; leave one of the two out"
+_NO_SCALE_FOR_A_FRONT = "scales one design, and the file asks for a front; write the problem in SI units instead"
+_ONLY_DIMENSIONLESS = "scales a dimensionless bicycle, and the file has none; leave the option out"
 
 
 def _parse_seconds(text: str) -> float:
@@ -50,12 +50,13 @@ def _parse_seconds(text: str) -> float:
         seconds = math.nan
     if 0 < seconds < math.inf:
         return seconds
-    accepted = "a positive number of seconds, or none. Write FILE before --certify."  # which may have taken it
+    # The text may be FILE, if it stands after --certify.
+    accepted = "a positive number of seconds, or no number at all. Write FILE before --certify."
     raise click.BadParameter(f"found {text!r}; accepted: {accepted}")
 
 
 class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
-    """Find the best design that FILE asks for, or the front of the best ones.
+    """Find the best design for the problem in FILE, or a Pareto front.
 
     Examples:
       tmsopt solve problems/ep4.toml --full
@@ -65,33 +66,37 @@ class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
     Exit status: 0 solved, 2 bad input, 3 infeasible, 4 not converged.
     """
 
-    over: str | None = option("Parameter that --plot draws over.")
-    full: bool = option("Show everything, each part under its name.")
+    over: str | None = option("Parameter on the horizontal axis of --plot.")
+    full: bool = option("Show all results, each under a heading.")
     certify: Any = option(
-        "Prove the optimum.  [default: 60]", type=_parse_seconds, metavar="[SECONDS]", is_flag=False, flag_value="60"
+        "Prove the optimum.  [default time: 60 s]",
+        type=_parse_seconds,
+        metavar="[SECONDS]",
+        is_flag=False,
+        flag_value="60",
     )
-    all: bool = option("Find all designs that have the pattern.")
-    seconds: float | None = option("Time for --all.  [default: 60]", type=click.FloatRange(0, min_open=True))
-    points: int | None = option("Points of a front.  [default: 25, or 12]", type=click.IntRange(2, MOST_POINTS))
+    all: bool = option("Find all designs with the root pattern.")
+    seconds: float | None = option("Time limit of --all in s.  [default: 60]", type=click.FloatRange(0, min_open=True))
+    points: int | None = option("Points of a front.  [default: 25 or 12x12]", type=click.IntRange(2, MOST_POINTS))
     workers: int | None = option("Processes for a front.  [default: up to 4]", type=click.IntRange(1))
-    wheelbase: str | None = option("Show SI for this wheelbase, e.g. 25cm.")
-    rear_mass: str | None = option("Show SI for this rear mass m_B, e.g. 9kg.")
-    starts: int | None = option("Most starts.  [default: 64, of a front 2]", type=click.IntRange(1, MOST_STARTS))
+    wheelbase: str | None = option("Also show SI units; wheelbase, e.g. 25cm.")
+    rear_mass: str | None = option("Also show SI units; rear mass m_B, e.g. 9kg.")
+    starts: int | None = option("Starts at most.  [default: 64; 2 for a front]", type=click.IntRange(1, MOST_STARTS))
 
     def run(self) -> Reply:
         from tmsopt.problem import as_solvable
 
         scale = _parse_scale("--wheelbase", self.wheelbase, "m"), _parse_scale("--rear-mass", self.rear_mass, "kg")
         problem = as_solvable(self.file, allows_front=True)
-        is_scaled = problem.model.name == "tms" and problem.parameter_set.rate is None
+        is_dimensionless = problem.model.name == "tms" and problem.parameter_set.rate is None
         self.refuse_useless(
-            (not self.all, "seconds", "is for the proof of --all; write --all too, or leave it out"),
-            (not self.plot, "over", "says what --plot draws over; add --plot FILE, or leave it out"),
-            (not problem.pareto, "points csv workers", _NO_FRONT),
-            (self.all, "certify full over wheelbase rear_mass", _ALL),
-            (problem.pareto, "certify over", _FRONT),
-            (problem.pareto, "wheelbase rear_mass", _SCALED),
-            (not is_scaled, "wheelbase rear_mass", _NOT_SCALED),
+            (not self.all, "seconds", "limits the time of --all; add --all, or leave the option out"),
+            (not self.plot, "over", "is the horizontal axis of --plot; add --plot FILE, or leave the option out"),
+            (not problem.pareto, "points csv workers", _ONLY_FOR_A_FRONT),
+            (self.all, "certify full over wheelbase rear_mass", _NOT_WITH_ALL),
+            (problem.pareto, "certify over", _NOT_FOR_A_FRONT),
+            (problem.pareto, "wheelbase rear_mass", _NO_SCALE_FOR_A_FRONT),
+            (not is_dimensionless, "wheelbase rear_mass", _ONLY_DIMENSIONLESS),
         )
         if self.certify:
             from tmsopt.proofs import check_installed
@@ -128,9 +133,9 @@ class SolveCommand(WithIpopt, WithCsv, WithPage, WithPlot, OnFile):
             return self._show(replace(solution, interrupted=True), w, m_B)
 
         def draw() -> Any:
-            speed = (si["g"] * si["w"]) ** 0.5 if solution.problem.model is tmsopt.models.tms else None
+            speed_unit = (si["g"] * si["w"]) ** 0.5 if solution.problem.model is tmsopt.models.tms else None
             growth = tmsopt.growth(solution, over=self.over, progress=progress_listener())
-            return tmsopt.plots.growth_figure(growth, solution.problem.title, speed)
+            return tmsopt.plots.growth_figure(growth, solution.problem.title, speed_unit)
 
         skipped_options = "" if math.isfinite(solution.abscissa) else "plot"
         if self.plot and skipped_options:
@@ -165,27 +170,28 @@ class ExploreCommand(WithSearch, OnFile):
       tmsopt explore problems/ep4.toml
       tmsopt explore problems/delivery_robot.toml --output robot.html --open
 
-    Exit status: 0 done, whatever the search found, 2 bad input.
+    Exit status: 0 done (whatever the search found), 2 bad input.
     """
 
-    output: Path | None = option("The page.  [default: FILE's name, .html]", None, "-o")
-    open: bool = option("Show it in the browser.")
+    output: Path | None = option("The page.  [default: FILE with ending .html]", None, "-o")
+    open: bool = option("Show the page in a browser.")
 
     def run(self) -> None:
         path = self.output or Path(f"{self.file.stem}.html")
-        check_output("--output", path, PAGES)
+        check_output("--output", path, PAGE_ENDINGS)
         page = tmsopt.explore(self.file, **self.search)
         with hold_signals(), report_writing("--output", path):
             page.save(path)
         if page.solution is not None and page.solution.status != "optimal":
             status = page.solution.status.replace("_", " ")
-            click.echo(f"{status}: the page opens with the nearest that was found", err=True)
+            click.echo(f"{status}: the page opens with the design nearest to a solution", err=True)
         if self.open and not import_module("webbrowser").open(path.resolve().as_uri()):
-            click.echo(f"no browser was found here; open {path} in one", err=True)
+            click.echo(f"no browser was found here; open {path} in a browser", err=True)
 
 
 class CompareCommand(WithIpopt, WithPlot, OnFile):
-    """Compare the optimum of FILE with the closed-form laws, and two formulations.
+    """Compare the optimum of FILE with the closed-form laws, and two formulations
+    of the problem with each other.
 
     Examples:
       tmsopt compare problems/ep4.toml
@@ -202,7 +208,7 @@ class CompareCommand(WithIpopt, WithPlot, OnFile):
 
 
 class ProveCommand(WithSearch, WithPage, WithPlot, OnFile):
-    """Prove that the solution of FILE exists, and whether it is stable and heavily damped.
+    """Prove that the solution of FILE exists, and decide if it is stable and heavily damped.
 
     Examples:
       tmsopt prove problems/ep4.toml --report proof.html
@@ -212,7 +218,7 @@ class ProveCommand(WithSearch, WithPage, WithPlot, OnFile):
     Exit status: 0 proved, 2 bad input, 3 no design found, 4 not proved.
     """
 
-    digits: int = option("Digits of every number.", 30, type=click.IntRange(1, 1000))
+    digits: int = option("Digits of all numbers.", 30, type=click.IntRange(1, 1000))
     exact: Mapping[str, str] = option("Exact value of a parameter.", metavar="NAME=VALUE", example="zeta_B=-1/3")
 
     def run(self) -> Reply:
@@ -254,7 +260,7 @@ def _parse_range(text: str) -> tuple[float, float]:
 
 
 class SpeedsCommand(WithPlot, OnFile):
-    """Find every weave and capsize speed of FILE, and every speed at which roots meet, exactly.
+    """Find exactly every weave and capsize speed of FILE, and every speed at which roots meet.
 
     Examples:
       tmsopt speeds problems/whipple_benchmark.toml
@@ -265,7 +271,7 @@ class SpeedsCommand(WithPlot, OnFile):
     """
 
     parameter: str | None = option("Parameter that varies.  [default: the speed]", metavar="NAME")
-    between: Any = option("Range to look through.  [default: all]", type=_parse_range, metavar="LOW,HIGH")
+    between: Any = option("Range to search.  [default: all]", type=_parse_range, metavar="LOW,HIGH")
 
     def run(self) -> Reply:
         problem = tmsopt.load(self.file)
@@ -274,7 +280,7 @@ class SpeedsCommand(WithPlot, OnFile):
 
 
 class SimulateCommand(WithCsv, WithPage, WithPlot, OnFile):
-    """Show what the design of FILE does after a lean, a push, or in noise.
+    """Show how the design of FILE moves after a lean or a push, or under noise.
 
     Examples:
       tmsopt simulate problems/whipple_benchmark.toml --lean 5 --plot motion.png
@@ -282,11 +288,11 @@ class SimulateCommand(WithCsv, WithPage, WithPlot, OnFile):
       tmsopt simulate problems/gain_schedule.toml --at v=1.5
       tmsopt simulate problems/ziegler.toml --start q2=0.1
 
-    Exit status: 0 done, stable or not, 2 bad input, 3 infeasible, 4 not converged.
+    Exit status: 0 done (stable or not), 2 bad input, 3 infeasible, 4 not converged.
     """
 
-    lean: float | None = option("Lean to the right at the start.", metavar="DEGREES")
-    steer: float | None = option("Steer to the right at the start.", metavar="DEGREES")
+    lean: float | None = option("Lean angle to the right at the start.", metavar="DEGREES")
+    steer: float | None = option("Steer angle to the right at the start.", metavar="DEGREES")
     push: float | None = option("Impulse of steer torque, in N m s.", metavar="IMPULSE")
     lean_push: float | None = option("Impulse of lean torque, in N m s.", metavar="IMPULSE")
     start: Mapping[str, float] = option(
@@ -295,12 +301,12 @@ class SimulateCommand(WithCsv, WithPage, WithPlot, OnFile):
     at: Mapping[str, float] = option("Another value of a parameter, in SI.", metavar="NAME=VALUE", example="v=1.5")
     noise: float | None = option("Noise of steer torque, in N m sqrt(s).", metavar="INTENSITY")
     seed: int = option("Seed of the noise.", 0, type=click.IntRange(0))
-    seconds: float | None = option("How long.  [default: until it has settled]")
-    points: int = option("Times in the table.", 1001, type=click.IntRange(2, 1_000_000))
-    path: bool = option("With --csv: torques and the wheels' path too.")
+    seconds: float | None = option("Seconds.  [default: until settled or grown]")
+    points: int = option("Number of times in the table.", 1001, type=click.IntRange(2, 1_000_000))
+    path: bool = option("Add torques and paths of the wheels to --csv.")
 
     def run(self) -> Reply:
-        self.refuse_useless((not self.csv, "path", "says what --csv writes; add --csv FILE"))
+        self.refuse_useless((not self.csv, "path", "changes what --csv writes; add --csv FILE"))
         problem = tmsopt.load(self.file)
         note_scenarios(problem.posed, self.at)
         options = self.select("lean steer push lean_push noise seed seconds points")
@@ -318,22 +324,22 @@ class TraceCommand(WithSearch, WithCsv, WithPage, WithPlot, OnFile):
       tmsopt trace problems/ep_set.toml --plot ep_set.png --axes Fr,lambda_s
       tmsopt trace problems/off_law.toml --pattern weave --csv weave.csv
 
-    Exit status: 0 traced, 2 bad input, 3 nothing of the pattern found in the box.
+    Exit status: 0 traced, 2 bad input, 3 pattern not found in the ranges.
     """
 
-    pattern: str | None = option("Pattern.  [default: the one that FILE locates]")
-    axes: Any = option("Two parameters to draw over, e.g. Fr,chi_B.", type=split_names, metavar="NAMES")
-    step: float = option("Longest step, in widths of the box.", 0.005, type=click.FloatRange(1e-6, 0.1))
-    starts: int = option("Fruitless starts in a row, to stop.", 48, type=click.IntRange(1, MOST_STARTS))
+    pattern: str | None = option("Root pattern.  [default: that in FILE]")
+    axes: Any = option("Axes of --plot, e.g. Fr,chi_B.", type=split_names, metavar="NAMES")
+    step: float = option("Longest step, as a fraction of the ranges.", 0.005, type=click.FloatRange(1e-6, 0.1))
+    starts: int = option("Stop after so many starts in a row without a find.", 48, type=click.IntRange(1, MOST_STARTS))
 
     def run(self) -> Reply:
-        self.refuse_useless((not self.plot, "axes", "says what --plot draws; add --plot FILE"))
+        self.refuse_useless((not self.plot, "axes", "changes what --plot draws; add --plot FILE"))
         problem = take_nominal(tmsopt.load(self.file).posed)
         if self.axes:
             _check_plane(self.axes, problem.free)
         result = tmsopt.trace(problem, self.pattern, step=self.step, **self.search)
         if not result.branches:
-            click.echo(f"no {result.pattern} found in the box; widen it, or try more --starts", err=True)
+            click.echo(f"no {result.pattern} found within the ranges; widen them, or try more --starts", err=True)
             return Reply(result, INFEASIBLE, skipped_options="csv plot")
         axes = self.axes or result.varying[:2]
         if self.plot:

@@ -28,12 +28,12 @@ STATUSES = {"optimal": 0, "infeasible": INFEASIBLE, "not_converged": NOT_CONVERG
 """Status of a solution → exit status."""
 
 _SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-_LOADING = {getattr(ExtensionFileLoader, name).__code__ for name in ("create_module", "exec_module")}
-_CASADI = "casadi.casadi"  # its wrappers in Python; compiled code calls them, and loses exceptions that they raise
+_LOADERS = {getattr(ExtensionFileLoader, name).__code__ for name in ("create_module", "exec_module")}
+_CASADI = "casadi.casadi"  # wrappers in Python; compiled code calls them, and loses the exceptions that they raise
 _WRITE_ERRORS = {errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG}
-_RETRY_SECONDS = 0.01  # seconds until a signal is tried again
-_AGAIN = 0.5  # seconds in which timeout(1) sends one signal twice, to a process and to its group
-_CLEANUP_SECONDS = 1.0  # seconds for tidying up after a second signal
+_RETRY_SECONDS = 0.01  # time until an interrupt is raised again
+_REPEAT_SECONDS = 0.5  # timeout(1) sends one signal twice within this time, to a process and to its group
+_CLEANUP_SECONDS = 1.0  # time for tidying up after a second signal
 
 
 class Signals:
@@ -47,43 +47,43 @@ class Signals:
         self.reset()
 
     def reset(self) -> None:
-        self.status, self._held, self._due, self._again = 0, False, False, 0.0
+        self.status, self._is_held, self._is_due, self._repeat_end = 0, False, False, 0.0
 
     def handle(self, number: int, frame: FrameType | None) -> None:
         now = time.monotonic()
         if not self.status:
-            self.status, self._due, self._again = 128 + number, True, now + _AGAIN
+            self.status, self._is_due, self._repeat_end = 128 + number, True, now + _REPEAT_SECONDS
             self.interrupt(number, frame)
-        elif now >= self._again:
+        elif now >= self._repeat_end:
             threading.Thread(target=self._exit_soon, daemon=True).start()
             raise SystemExit(self.status)
 
     def interrupt(self, _number: int, frame: FrameType | None) -> None:
-        """Raise the interrupt that is due; try again later while compiled code runs that would lose it."""
-        if not self._due or self._held:
+        """Raise the interrupt if it is due. While compiled code runs that would lose the interrupt, try again later."""
+        if not self._is_due or self._is_held:
             return
         if _loses_exceptions(frame) and hasattr(signal, "setitimer"):
             self._try_again()
             return
-        self._due = False
+        self._is_due = False
         raise KeyboardInterrupt
 
     def recover(self, event: Any) -> None:
-        """Raise an interrupt again that Python could not raise; used as the hook for unraisable exceptions."""
+        """Raise an interrupt again that Python could not raise. This is the hook for unraisable exceptions."""
         if not self.status or not isinstance(event.exc_value, KeyboardInterrupt):
             sys.__unraisablehook__(event)
         elif hasattr(signal, "setitimer"):
-            self._due = True
+            self._is_due = True
             self._try_again()
 
     @contextmanager
     def hold(self) -> Iterator[None]:
         """Delay the interrupt of the first signal until the context ends."""
-        self._held = True
+        self._is_held = True
         try:
             yield
         finally:
-            self._held = False
+            self._is_held = False
         self.interrupt(0, None)
 
     def _try_again(self) -> None:
@@ -92,9 +92,9 @@ class Signals:
 
     def _exit_soon(self) -> None:
         time.sleep(_CLEANUP_SECONDS)
-        erasing = threading.Thread(target=close_progress, daemon=True)
-        erasing.start()
-        erasing.join(_CLEANUP_SECONDS)  # a limit, because a stopped terminal never accepts the text
+        eraser = threading.Thread(target=close_progress, daemon=True)
+        eraser.start()
+        eraser.join(_CLEANUP_SECONDS)  # a limit, because a stopped terminal never accepts the text
         os._exit(self.status)
 
 
@@ -105,11 +105,11 @@ hold_signals = _HANDLER.hold
 
 
 @contextmanager
-def handle_signals(for_good: bool) -> Iterator[Signals]:
+def handle_signals(ends_process: bool) -> Iterator[Signals]:
     """Handle signals in a context, except signals that the caller of this program has set to be ignored.
 
     Args:
-        for_good: whether the process ends afterwards; then later signals do not change its exit status.
+        ends_process: whether the process ends afterwards; then later signals do not change its exit status.
     """
     _HANDLER.reset()
     if threading.current_thread() is not threading.main_thread():
@@ -124,13 +124,13 @@ def handle_signals(for_good: bool) -> Iterator[Signals]:
         yield _HANDLER
     finally:
         for number, handler in old_handlers.items():
-            signal.signal(number, signal.SIG_IGN if for_good else handler)
+            signal.signal(number, signal.SIG_IGN if ends_process else handler)
         sys.unraisablehook = hook
 
 
 def exit_now(status: int) -> None:
-    """End the process at once. Python itself would wait for threads, and it would end by SIGINT, whatever the status,
-    if the interrupt came in an `exec`, which dataclasses use while modules load."""
+    """End the process at once. The usual exit of Python would wait for threads. It would also end by SIGINT instead of
+    the status, if the interrupt came in an `exec`, which dataclasses use while modules load."""
     atexit._run_exitfuncs()
     os._exit(status)
 
@@ -141,7 +141,7 @@ def report_end() -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        print("stopped; what was printed before stands", file=sys.stderr)
+        print("stopped; all text printed before is valid", file=sys.stderr)
         sys.exit(INTERRUPTED)
     except BrokenPipeError:
         sys.exit(UNREAD)  # quietly, as other programs do
@@ -150,9 +150,9 @@ def report_end() -> Iterator[None]:
         if error.filename:
             text = f"'{error.filename}' cannot be read or written: {reason}"
         elif error.errno in _WRITE_ERRORS:
-            text = f"the answer cannot be written: {reason}; give a file or a device with room"
+            text = f"the answer cannot be written: {reason}; give a file or a device with free space"
         else:
-            text = f"the system refuses what is needed: {reason}"
+            text = f"the operating system reports an error: {reason}"
         print(text, file=sys.stderr)
         sys.exit(BAD_INPUT)
 
@@ -189,9 +189,9 @@ def open_streams() -> Iterator[TextIO]:
     A stream that was closed when the program began is replaced: stdin is empty, stderr drops its text, and stdout
     raises an error. Otherwise the next file that is opened would get the number of the stream, and receive its text.
     """
-    for number, name, way in ((0, "stdin", os.O_RDONLY), (1, "stdout", os.O_RDONLY), (2, "stderr", os.O_WRONLY)):
+    for number, name, mode in ((0, "stdin", os.O_RDONLY), (1, "stdout", os.O_RDONLY), (2, "stderr", os.O_WRONLY)):
         if getattr(sys, name) is None:
-            handle = os.open(os.devnull, way)  # gets the smallest free number, which is that of the closed stream
+            handle = os.open(os.devnull, mode)  # gets the smallest free number: the number of the closed stream
             setattr(sys, name, os.fdopen(handle, "w" if number else "r", encoding="utf-8"))
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
@@ -217,7 +217,7 @@ def open_streams() -> Iterator[TextIO]:
 
 def _loses_exceptions(frame: FrameType | None) -> bool:
     while frame is not None:
-        if frame.f_code in _LOADING or frame.f_globals.get("__name__") == _CASADI:
+        if frame.f_code in _LOADERS or frame.f_globals.get("__name__") == _CASADI:
             return True
         frame = frame.f_back
     return False

@@ -11,7 +11,7 @@ import click
 import tmsopt
 from tmsopt import guide
 from tmsopt.cli.answers import (
-    FIGURES,
+    FIGURE_ENDINGS,
     Reply,
     answer,
     check_output,
@@ -38,7 +38,7 @@ class NewCommand(OnFile):
     Exit status: 0 done, 2 bad input, such as a FILE that is there already.
     """
 
-    model: str = option("Its model.", "tms", metavar="[tms|whipple|own]")
+    model: str = option("Model of the problem.", "tms", metavar="[tms|whipple|own]")
 
     def run(self) -> None:
         check_output("FILE", self.file, ("toml",))
@@ -50,7 +50,7 @@ def _complete_names(_context: Any, _argument: Any, incomplete: str) -> list[str]
 
 
 class WithToml(Command):
-    output: Path | None = option("A new file (toml).", None, "-o", endings=("toml",))
+    output: Path | None = option("Name of the new file (toml).", None, "-o", endings=("toml",))
 
 
 class ExampleCommand(WithToml):
@@ -100,7 +100,7 @@ class DescribeCommand(Command):
 
 
 class SchemaCommand(Command):
-    """Write the JSON Schema of problem and study files: editors complete and check by it.
+    """Write the JSON Schema of problem and study files, with which editors complete and check them.
 
     Examples:
       tmsopt schema --output tmsopt.schema.json
@@ -109,7 +109,7 @@ class SchemaCommand(Command):
     Exit status: 0 done, 2 bad input.
     """
 
-    output: Path | None = option("A new file (json).  [default: stdout]", None, "-o", endings=("json",))
+    output: Path | None = option("Name of the new file (json).  [default: stdout]", None, "-o", endings=("json",))
 
     def run(self) -> None:
         print_or_write(guide.schema_text(), self.output)
@@ -126,8 +126,8 @@ class ConvertCommand(WithToml, OnFile):
     Exit status: 0 done, 2 bad input, such as a file that is there already.
     """
 
-    to: str = option("The other model.", "whipple", metavar="[whipple]")
-    inertia: str = option("Shape of a body.", "boxes", metavar="[boxes|none]")
+    to: str = option("Model of the new problem.", "whipple", metavar="[whipple]")
+    inertia: str = option("Shape of the bodies.", "boxes", metavar="[boxes|none]")
     body: str | None = option("Size of the rear frame, e.g. 40x20x30cm.")
     front: str | None = option("Size of the front assembly, e.g. 10x10x30cm.")
 
@@ -137,7 +137,7 @@ class ConvertCommand(WithToml, OnFile):
 
 
 class ImportCommand(WithToml, OnFile):
-    """Make a problem file of a bicycle that BicycleParameters has measured.
+    """Make a problem file of a bicycle that was measured with BicycleParameters.
 
     Examples:
       tmsopt import BrowserBenchmark.txt
@@ -146,7 +146,7 @@ class ImportCommand(WithToml, OnFile):
     Exit status: 0 done, 2 bad input.
     """
 
-    speed: float | None = option("Speed in m/s.  [default: of FILE, or 5]", type=click.FloatRange(0))
+    speed: float | None = option("Speed in m/s.  [default: the speed in FILE, or 5]", type=click.FloatRange(0))
 
     def run(self) -> None:
         from tmsopt.models import problem_text, read_bicycle
@@ -158,9 +158,9 @@ class ImportCommand(WithToml, OnFile):
 
 
 class FigureCommand(Command):
-    """Draw the figure NAME of the paper, or all of them.
+    """Draw the figure NAME of the paper, or all figures.
 
-    NAME is one that --list shows, its label in the paper such as fig3, or 'all'.
+    NAME is a name that --list shows, a label of the paper such as fig3, or 'all'.
 
     Examples:
       tmsopt figure --list
@@ -172,17 +172,17 @@ class FigureCommand(Command):
 
     name: str | None = argument(None)
     output: Path | None = option("File, or with 'all' a folder.  [default: NAME.png]")
-    format: Literal["png", "pdf", "svg"] | None = option("[default: as --output ends, or png]")
-    json: bool = option("Write names, captions and files as JSON.")
+    format: Literal["png", "pdf", "svg"] | None = option("Format.  [default: ending of --output, or png]")
+    json: bool = option("Write names, captions and file names as JSON.")
     list: bool = option("List the figures and draw nothing.")
 
     def run(self) -> None:
-        from tmsopt.plots.paper import GALLERY, find
+        from tmsopt.plots.paper import GALLERY, find_item
 
-        if not (self.name or self.list):  # no label of the paper is empty either
+        if not (self.name or self.list):  # no NAME, or an empty one
             raise input_error(f"missing; accepted: {' '.join(GALLERY)} all", "NAME")
         is_for_all = self.list or self.name == "all"
-        items = [*GALLERY.values()] if is_for_all else [find(str(self.name))]
+        items = [*GALLERY.values()] if is_for_all else [find_item(str(self.name))]
         data = [{"name": item.name, "alias": item.alias, "caption": item.caption} for item in items]
         if not self.list:
             files = self._choose_files([f"{item.name}.{self.format or 'png'}" for item in items], is_for_all)
@@ -193,7 +193,7 @@ class FigureCommand(Command):
             answer(self.json, text, lambda: {"schema": 1, "figures": data})
 
     def _choose_files(self, names: Sequence[str], is_for_all: bool) -> Sequence[Path]:
-        """The files to write; raise InputError if one of them cannot be written."""
+        """The files to write; raise InputError if a file cannot be written."""
         files = [self.output or Path(names[0])]
         if is_for_all:
             folder = self.output or Path()
@@ -203,7 +203,7 @@ class FigureCommand(Command):
                 raise input_error(f"'{folder}' cannot be a directory: {error.strerror}", "--output") from None
             files = [folder / name for name in names]
         for path in files:
-            check_output("--output", path, (self.format,) if self.format else FIGURES)
+            check_output("--output", path, (self.format,) if self.format else FIGURE_ENDINGS)
         return files
 
 
@@ -213,10 +213,10 @@ def _describe_item(item: Any) -> str:
 
 
 def _draw_items(items: Sequence[Any], files: Sequence[Path]) -> None:
-    from tmsopt.plots.paper import pictures
+    from tmsopt.plots.paper import render_pictures
 
     steps = start_steps(progress_listener(), "drawing", "figure")
-    with closing(pictures(items, [path.suffix[1:].lower() for path in files])) as finished_pictures:
+    with closing(render_pictures(items, [path.suffix[1:].lower() for path in files])) as finished_pictures:
         for count, (k, picture) in enumerate(finished_pictures, start=1):
             with report_writing("--output", files[k]), write_atomic(files[k]) as temporary:
                 temporary.write_bytes(picture)
@@ -225,18 +225,18 @@ def _draw_items(items: Sequence[Any], files: Sequence[Path]) -> None:
 
 
 class VerifyCommand(WithPlot):
-    """Recompute every number and statement of the source paper, with a verdict on each.
+    """Recompute every number and statement of the paper, and give a verdict on each.
 
     Examples:
       tmsopt verify --only 'tab1-*' --only epset
       tmsopt verify --json > ledger.json
       tmsopt verify --markdown problems/paper.md
 
-    Exit status: 0 when the ledger was computed, whatever the verdicts; 2 bad input.
+    Exit status: 0 the ledger was computed, whatever its verdicts; 2 bad input.
     """
 
     markdown: Path | None = option("Write the ledger as a page (md).", endings=("md",))
-    only: tuple[str, ...] = option("Compute these entries; * and ? are wildcards.", metavar="KEY")
+    only: tuple[str, ...] = option("Compute only these entries; wildcards: * and ?.", metavar="KEY")
 
     def run(self) -> Reply:
         from tmsopt.documents import write_ledger_page

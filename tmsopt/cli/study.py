@@ -22,31 +22,35 @@ from tmsopt.progress import Progress
 
 
 class StudyCommand(WithPage, WithPlot, OnFile):
-    """Solve the problem of the study FILE for every row of what varies in it.
+    """Solve the problem of the study FILE for every row of its varied values.
 
     Examples:
       tmsopt study problems/study_sway.toml --row 7
       tmsopt study problems/study_sway.toml --workers 4 --export rows.csv
       tmsopt study problems/study_built.toml --plot built.png
 
-    The same command goes on where it was stopped, and shows the rows in the store.
+    After a stop, the same command continues, and shows all rows in the store.
 
     Exit status: 0 done, failed rows included; 2 bad input.
     """
 
-    store: Path | None = option("SQLite file of the rows.  [default: NAME.sqlite]")
-    fresh: bool = option("Move an existing store aside and start anew.")
-    row: int | None = option("Solve this row alone; no store.", type=click.IntRange(0))
-    workers: int | None = option("Processes.  [default: as many as cores]", type=click.IntRange(1))
+    store: Path | None = option("SQLite file for the rows.  [default: NAME.sqlite]")
+    fresh: bool = option("Start anew; rename an existing store.")
+    row: int | None = option("Solve only this row, without a store.", type=click.IntRange(0))
+    workers: int | None = option("Number of processes.  [default: one per core]", type=click.IntRange(1))
     scheduler: str | None = option("Dask cluster, instead of processes.", metavar="ADDRESS")
-    export: tuple[Path, ...] = option("Write all rows (csv, parquet, nc), repeatable.")
+    export: tuple[Path, ...] = option("Write all rows (csv, parquet, nc); repeatable.")
 
     def run(self) -> int:
         from tmsopt.studies import check_export, load_study
 
-        no_effect = "has no effect with --row, which solves one row and keeps nothing; leave one of the two out"
+        no_effect = "has no effect with --row, which solves one row and stores nothing; leave one of the two out"
         self.refuse_useless(
-            (self.scheduler, "workers", "is for processes of this machine; leave it out with --scheduler"),
+            (
+                self.scheduler,
+                "workers",
+                "has no effect with --scheduler; leave one of the two out",
+            ),
             (self.row is not None, "store fresh export plot report workers scheduler", no_effect),
         )
         for target in self.export:
@@ -67,27 +71,27 @@ class StudyCommand(WithPage, WithPlot, OnFile):
             write_file("--export", target, lambda path: results.export(path, progress_listener()))
         write_files(self, Reply(results), *self._list_files(with_rows=False))
         if is_stopped:
-            click.echo(f"stopped: the rows solved so far are in {path}; the same command goes on", err=True)
+            click.echo(f"stopped: the rows solved so far are in {path}; the same command continues the work", err=True)
         return INTERRUPTED if is_stopped else 0
 
     def _check_distinct_files(self, store: Path) -> None:
         """Check that no file is written twice, and that no file of the study is overwritten."""
-        uses = {realpath(path): "what the study is read from" for path in self._list_files(with_rows=True)}
+        uses = {realpath(path): "a file of the study" for path in self._list_files(with_rows=True)}
         exports = [("--export", target) for target in self.export]
         for name, path in [("--store", store), *exports, ("--plot", self.plot), ("--report", self.report)]:
             if path and (real_path := realpath(path)) in uses:
                 raise input_error(f"'{path}' is {uses[real_path]}; give another name", name)
             if path:
-                uses[real_path] = f"what {name} writes"
+                uses[real_path] = f"the file that {name} writes"
 
     def _list_files(self, with_rows: bool) -> list[Path]:
-        """The files of the study: its own, and those of its problem and of its rows if it names them."""
+        """The study file, the problem file if the study names one, and with `with_rows` the CSV file of the rows."""
         tables = tomllib.loads(read_text(str(self.file), "TOML study file"))
         names = [tables.get("problem"), tables.get("study", {}).get("csv") if with_rows else None]
         return [self.file, *(self.file.parent / name for name in names if isinstance(name, str))]
 
     def _solve_rows(self, study: "tmsopt.Study", path: Path) -> "tuple[tmsopt.Results, bool]":
-        """The study with its rows, and whether it was stopped before its end."""
+        """The study with its rows, and whether the user stopped it."""
         from tmsopt.executor import EngineError
         from tmsopt.studies import read_results
 
@@ -104,7 +108,7 @@ class StudyCommand(WithPage, WithPlot, OnFile):
         try:
             return tmsopt.run_study(study, path, fresh=self.fresh, progress=update, **engine), False
         except KeyboardInterrupt:
-            if not row_counts:  # it was stopped before the first row
+            if not row_counts:  # the study was stopped before the first row
                 raise
             return replace(read_results(study, path), found=int(row_counts[0])), True
         except EngineError as error:
@@ -146,5 +150,5 @@ def _prepare_study(request: "tmsopt.Study | tmsopt.Sampling", store: Path | None
     try:
         return prepare_study(request, progress_listener(), store)
     except tmsopt.NotSolved as error:
-        click.echo(f"there is no design to draw around: {error}", err=True)
+        click.echo(f"there is no nominal design: {error}", err=True)
         sys.exit(BAD_INPUT)

@@ -1,6 +1,6 @@
 """The progress line: one line on stderr of a terminal while a command works. It is erased before other text is written.
 
-A thread draws it, so that it appears within a second, and its seconds are counted whatever the command does. `Live` of
+A thread draws the line, so that it appears within a second, and its seconds go on whatever the command does. `Live` of
 Rich is not used, because it takes long to load, hides the cursor, and ends its line with a line feed.
 """
 
@@ -14,9 +14,10 @@ from typing import Any
 
 from tmsopt.progress import Listener, Progress
 
-_FIRST_DELAY, _REDRAW_DELAY = 0.4, 0.1  # seconds until the line is drawn for the first time, and drawn again
-_WIDTH = 80  # columns of a terminal whose width is unknown
-_ERASE = "\r\033[K"
+_FIRST_DELAY = 0.4  # seconds until the line is drawn for the first time
+_REDRAW_DELAY = 0.1  # seconds until the line is drawn again
+_DEFAULT_WIDTH = 80  # columns of a terminal whose width is unknown
+_ERASE = "\r\033[K"  # characters that erase a line of a terminal
 _MINUTE, _HOUR = 60, 3600
 
 
@@ -25,22 +26,22 @@ class _Line:
 
     def __init__(self, stream: Any) -> None:
         self._stream, self._lock, self._closed = stream, threading.RLock(), threading.Event()
-        self._progress, self._since = Progress("starting"), time.perf_counter()
-        self._due, self._is_drawn, self._holders = self._since + _FIRST_DELAY, False, 0
+        self._progress, self._update_time = Progress("starting"), time.perf_counter()
+        self._draw_time, self._is_drawn, self._holder_count = self._update_time + _FIRST_DELAY, False, 0
         threading.Thread(target=self._keep_drawing, daemon=True).start()
 
     def update(self, progress: Progress) -> None:
         with self._lock:
-            self._progress, self._since = progress, time.perf_counter()
+            self._progress, self._update_time = progress, time.perf_counter()
             self._draw()
 
     def hold(self, count: int) -> None:
-        """Add `count` holders and erase the line; it is drawn again when there are no holders."""
+        """Add `count` holders, and erase the line. It is drawn again when there are no holders."""
         with self._lock:
-            self._holders += count
+            self._holder_count += count
             if self._is_drawn:
                 self._write(_ERASE)
-            self._is_drawn, self._due = False, max(self._due, time.perf_counter() + _REDRAW_DELAY)
+            self._is_drawn, self._draw_time = False, max(self._draw_time, time.perf_counter() + _REDRAW_DELAY)
 
     def close(self) -> None:
         self._closed.set()
@@ -53,9 +54,9 @@ class _Line:
     def _draw(self) -> None:
         with self._lock:
             now = time.perf_counter()
-            if now >= self._due and not self._holders:
-                self._due, self._is_drawn = now + _REDRAW_DELAY, True
-                text = describe_progress(self._progress, now - self._since, count_columns(self._stream) - 1)
+            if now >= self._draw_time and not self._holder_count:
+                self._draw_time, self._is_drawn = now + _REDRAW_DELAY, True
+                text = describe_progress(self._progress, now - self._update_time, count_columns(self._stream) - 1)
                 self._write(f"\r{text}\033[K")
 
     def _write(self, text: str) -> None:
@@ -64,7 +65,7 @@ class _Line:
             self._stream.flush()
 
 
-_OPEN_LINES: list[_Line] = []  # the last line is that of this command; the others are of commands that called it
+_OPEN_LINES: list[_Line] = []  # the last line belongs to this command, the others to commands that called it
 
 
 @contextmanager
@@ -113,9 +114,9 @@ def hide_progress() -> Iterator[None]:
 def count_columns(stream: Any) -> int:
     """Columns of a terminal."""
     try:
-        return os.get_terminal_size(stream.fileno()).columns or _WIDTH
+        return os.get_terminal_size(stream.fileno()).columns or _DEFAULT_WIDTH
     except (OSError, ValueError):
-        return _WIDTH
+        return _DEFAULT_WIDTH
 
 
 def describe_progress(progress: Progress, elapsed: float = 0.0, width: int = 1000) -> str:
@@ -133,8 +134,8 @@ def describe_progress(progress: Progress, elapsed: float = 0.0, width: int = 100
         text += f" ({_format_time(math.floor(seconds))})"
     if len(text) > width and is_counted:
         end = f"/{progress.most:,.0f}" if has_end else f" {progress.unit}"
-        rest = f", {_format_time(max(progress.left - elapsed, 1))} left" if math.isfinite(progress.left) else ""
-        text = f"{progress.what}: {progress.done:,.0f}{end}{rest}"
+        time_left = f", {_format_time(max(progress.left - elapsed, 1))} left" if math.isfinite(progress.left) else ""
+        text = f"{progress.what}: {progress.done:,.0f}{end}{time_left}"
     return text[:width]
 
 

@@ -20,20 +20,20 @@ from tmsopt.search import solve
 _BENCHMARKS = {"tms": "benchmark", "whipple": "whipple_benchmark"}
 """Model → name of the example with the published bicycle."""
 
-_EP_STARTS = 2  # starts of the search for an exceptional point, which need not exist
-_MAX_EP_ORDER = 4  # largest number of roots that meet in it
+_EP_STARTS = 2  # number of starts of the search for an exceptional point
+_MAX_EP_ORDER = 4  # largest multiplicity of that exceptional point
 
 
 @dataclass(frozen=True)
 class PageDesign:
-    """A design with a name, and with the structure of its roots in the user's units, multiple roots recognised.
+    """A design with a name, and with the structure of its roots, in which multiple roots are recognised.
 
     Attributes:
         facts: sentences about the design.
-        is_answer: whether the design solves the problem, or is the nearest to a solution.
-        proved: one line about its proof; empty without a proof.
-        verdict: verdict on its stability, with the power of t with which it grows, as in JSON; empty if not computed.
-        meetings: the roots that meet in each multiple root.
+        is_answer: whether the design solves the problem, or is the design nearest to a solution.
+        proof_text: one line about its proof; empty without a proof.
+        verdict: verdict on its stability, and the power of t with which it grows, as in JSON; empty if not computed.
+        meetings: for each multiple root, the roots that meet there.
     """
 
     name: str
@@ -41,7 +41,7 @@ class PageDesign:
     structure: Structure
     facts: tuple[str, ...]
     is_answer: bool = False
-    proved: str = ""
+    proof_text: str = ""
     verdict: Mapping[str, Any] = field(default_factory=dict)
     meetings: tuple[MultipleRoot, ...] = ()
 
@@ -52,10 +52,10 @@ def list_designs(
     search: bool,
     more_designs: Sequence[tuple[str, Mapping[str, float]]] = (),
 ) -> list[PageDesign]:
-    """The designs that a page offers; a given solution is the first one.
+    """The designs that a page offers; the first one is the solution, if there is one.
 
     Args:
-        search: whether to search for an exceptional point, unless the solution is one or is not stable.
+        search: whether to search for an exceptional point if the solution is stable and has none.
         more_designs: names and parameters of further designs that solve the problem.
     """
     nominal = problem.nominal
@@ -79,14 +79,14 @@ def _describe_solution(solution: Solution) -> PageDesign:
     """The solution with its status, verdict and proof."""
     problem = solution.problem.posed
     names = {"optimal": "optimum", "infeasible": "least infeasible", "not_converged": "best so far"}
-    words = describe_status(solution), describe_verdict(solution)
-    facts, proof = [": ".join(filter(None, words)), *solution.notes], f"proof: {proof_line(solution)}"
+    sentences = describe_status(solution), describe_verdict(solution)
+    facts, proof = [": ".join(filter(None, sentences)), *solution.notes], f"proof: {proof_line(solution)}"
     proof_text = proof if solution.bound.proven else ""
     if problem.nominal is problem:
         structure = Structure(solution.structure, solution.roots, 0.0)
     else:  # the proof holds for all cases together, and the page shows one case
         structure, proof_text = _compute_structure(problem, solution.parameters), ""
-        facts[0] += " over every case of its bands and tolerances"
+        facts[0] += " in all cases of its bands and tolerances"
     name = names[solution.status] if problem.free else "as given"
     if problem.sense == "locate" and solution.status == "optimal":
         name = str(problem.locate)
@@ -102,7 +102,7 @@ def _find_benchmark(problem: Posed) -> Iterator[PageDesign]:
         return
     try:
         text = example(_BENCHMARKS[problem.model.name])
-    except InputError:  # an installation without the examples
+    except InputError:  # the examples are not installed
         return
     _, benchmark = problem_from_tables(tomllib.loads(text), "")
     assert benchmark is not None
@@ -115,7 +115,7 @@ def _find_benchmark(problem: Posed) -> Iterator[PageDesign]:
 
 
 def _find_exceptional_point(problem: Posed) -> Iterator[PageDesign]:
-    """The exceptional point of the highest order that the free parameters allow, without constraints, if it is found.
+    """Find the exceptional point of the highest order that the free parameters allow, without constraints.
 
     A k-fold root needs k − 1 free parameters.
     """
@@ -126,7 +126,7 @@ def _find_exceptional_point(problem: Posed) -> Iterator[PageDesign]:
         return
     solution = solve(ep_problem, throw=False, starts=_EP_STARTS, stability=0.0, alone=False)
     if solution.status == "optimal" and "EP" in solution.structure:
-        facts = ("limits left aside",) if problem.constraints else ()
+        facts = ("found without the limits",) if problem.constraints else ()
         yield PageDesign(
             solution.structure, solution.parameters, Structure(solution.structure, solution.roots, 0.0), facts
         )

@@ -1,4 +1,4 @@
-"""Writes one page for a problem: its solution, if it has an objective, and other designs to look at."""
+"""Writes one page for a problem: its solution, if the problem has an objective, and other designs."""
 
 import json
 import re
@@ -22,12 +22,12 @@ from tmsopt.progress import start_steps
 from tmsopt.records import plain
 from tmsopt.search import solve
 
-_HEIGHT = 900  # height of the frame in a notebook in pixels; it shows the header and the first row of pictures
+_FRAME_HEIGHT = 900  # pixels of the frame in a notebook; it shows the header and the first row of pictures
 _ENDINGS = (".html", ".htm")
 
-_COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)
+_COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)  # a comment on lines of its own
 _STYLE_BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # blanks that have no meaning in a style sheet
-_TEXT = re.compile(r'("(?:[^"\\]|\\.)*")')
+_TEXT = re.compile(r'("(?:[^"\\]|\\.)*")')  # a text in double quotes
 _OPERATOR_BLANKS = re.compile(r" ?([=!]==|=>|\*=|[<>]=?|[?:|&*]{1,2}|[-+]=|[=,;{}()\[\]]) ?| ([-+]) (?![-+])")
 """Operators of a script with the blanks around them."""
 _SCRIPT_NAMES = "numerics state axes chart plane growth bicycle motion controls facts api main"
@@ -39,7 +39,7 @@ class Explorer:
 
     Attributes:
         problem: the problem that the page shows.
-        solution: its optimum; None if the problem has no objective.
+        solution: the optimum of the problem; None if the problem has no objective.
         html: the page, which sends no request to a server.
 
     Example:
@@ -100,7 +100,7 @@ def explore(problem: ProblemSource, **options: Unpack[CommonOptions]) -> Explore
             posed = posed.derive(pareto=(), minimize=posed.pareto[0])
         if posed.sense != "evaluate" or not posed.free:
             solution = solve(posed, throw=False, stability=0.0, **options)
-    start_steps(listener, "looking for designs worth going to")
+    start_steps(listener, "looking for other designs")
     designs = list_designs(posed, solution, search=True)
     start_steps(listener, "writing the page")
     html = _write_html(posed, designs, model if isinstance(model, dict) else {}, trace_curves=True)
@@ -113,7 +113,7 @@ def page_of(
     *,
     trace_curves: bool = False,
 ) -> str:
-    """The page of a problem or a solution as HTML; no design is searched.
+    """The page of a problem or a solution as HTML, without a search for further designs.
 
     Args:
         more_designs: names and parameters of more designs; the page of a problem opens with the first of them.
@@ -128,11 +128,11 @@ def frame(html: str, title: str) -> str:
     """A page in a frame of another page; it can neither read nor change that page."""
     return (
         f'<iframe title="{escape(title or "explorer")}" sandbox="allow-scripts allow-downloads" '
-        f'style="width:100%;height:{_HEIGHT}px;border:0" srcdoc="{escape(html)}"></iframe>'
+        f'style="width:100%;height:{_FRAME_HEIGHT}px;border:0" srcdoc="{escape(html)}"></iframe>'
     )
 
 
-# The page as one file: the parts that are the same in every page, and the formulas and data of one problem
+# The page is one file. It has the parts that are the same in every page, and the formulas and data of one problem.
 
 
 def _write_html(problem: Posed, designs: Sequence[PageDesign], model: Mapping[str, Any], trace_curves: bool) -> str:
@@ -141,14 +141,14 @@ def _write_html(problem: Posed, designs: Sequence[PageDesign], model: Mapping[st
     data = make_page_data(problem, designs, script, model, trace_curves) | {"version": version("tmsopt")}
     page_scripts = script.text, kernel_script(problem.model.degree), f"const DATA = {_format_json(data)};"
     parts = [*page_scripts, *(_read_minified(f"{name}.js") for name in _SCRIPT_NAMES.split())]
-    marks = {
+    contents = {  # mark in page.html → what replaces it
         "<!-- title -->": escape(problem.title or problem.model.title),
         "/* style */": _STYLE_BLANKS.sub(r"\1\2", _read_minified("page.css")),
         "/* script */": "\n".join(parts),
     }
-    pattern = "|".join(map(re.escape, marks))
+    pattern = "|".join(map(re.escape, contents))
     # All marks are replaced at once, because a title may look like a mark.
-    return re.sub(pattern, lambda mark: marks[mark[0]], _read_minified("page.html"))
+    return re.sub(pattern, lambda mark: contents[mark[0]], _read_minified("page.html"))
 
 
 def _read_minified(name: str) -> str:

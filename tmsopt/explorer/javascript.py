@@ -1,6 +1,7 @@
 """Writes formulas as JavaScript: each operation becomes the text that computes it.
 
-A result that is used once is written where it is used; the others get the names t0, t1, …. No name comes from a file.
+A result that is used once is written where it is used; other results get the names t0, t1, …. No name comes from the
+user's file. Functions that have an array as last argument write their results to it.
 """
 
 import json
@@ -31,7 +32,7 @@ class Script:
     Attributes:
         text: ``const MODEL = {…};``
         quantities: names of the derived quantities, in the order in which ``MODEL.derived`` returns them.
-        constraints: names of the constraints, whose margins follow the quantities there.
+        constraints: names of the constraints, whose margins follow the quantities in the result of ``MODEL.derived``.
     """
 
     text: str
@@ -42,7 +43,7 @@ class Script:
 def model_script(problem: Posed) -> Script:
     """The model of a problem: coefficients, derived quantities, margins of constraints, matrices, unit of time, motion.
 
-    Constraints on the robustness radius are left out, because it needs a search. The parameters are those of
+    Constraints on the robustness radius are left out, because the radius needs a search. The parameters are those of
     `problem.parameter_set`, in its order, in SI units and radians.
     """
     model, parameter_set = problem.model, problem.parameter_set
@@ -81,8 +82,8 @@ def function(
     """A JavaScript function, or a method, that computes a formula.
 
     Args:
-        inputs: name of an input → its text.
-        fills: whether the function writes its results to its last argument, an array; else it returns its only result.
+        inputs: name of an input of the formula → JavaScript text for this input.
+        fills: whether the function writes its results to its last argument, an array. Otherwise it returns its result.
     """
     results: list[str] = []
 
@@ -93,10 +94,10 @@ def function(
     operations = {op: partial(_write_operation, template, name_term) for op, template in _OPERATIONS.items()}
     kind = Kind(operations | {"pow": partial(_write_power, name_term)}, lambda x: _format_number(as_double(x)))
     texts = map(_strip_parentheses, fold(expression, inputs, kind, name_term))
-    ends = [f"{arguments[-1]}[{k}]={t};" for k, t in enumerate(texts)] if fills else [f"return {next(texts)};"]
+    lines = [f"{arguments[-1]}[{k}]={t};" for k, t in enumerate(texts)] if fills else [f"return {next(texts)};"]
     if results:
-        ends = [f"const {','.join(results)};", *ends]
-    return "\n".join([f"{name}({', '.join(arguments)}) {{", *ends, "}"])
+        lines = [f"const {','.join(results)};", *lines]
+    return "\n".join([f"{name}({', '.join(arguments)}) {{", *lines, "}"])
 
 
 def _format_number(value: float) -> str:
@@ -106,7 +107,7 @@ def _format_number(value: float) -> str:
 
 
 _POWERS = {"(-1)": "(1/{0})", "3": "({0}*{0}*{0})", "4": "({0}*{0}*({0}*{0}))"}
-"""Exponent → text of the power, computed like powers of floats in tmsopt."""
+"""Exponent → text of the power, which is computed as tmsopt computes powers of doubles."""
 
 _OPERATIONS: Mapping[str, str] = {
     "add": "({0}+{1})",
@@ -131,27 +132,26 @@ _OPERATIONS: Mapping[str, str] = {
     **{name: f"Math.{name}({{0}})" for name in ("sqrt", "cbrt", "abs", "sign", "exp", "log")},
     **{name: f"Math.{name}({{0}})" for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
 }
-"""Operation → its text, with {0}, {1}, … for the operands; a text that is not a call has parentheses."""
+"""Operation → its JavaScript text, with {0}, {1}, … for the operands. All texts but calls have parentheses."""
 
 _MAX_INLINE_LENGTH = 160
 """Largest number of characters of a result that is written where it is used."""
 
 
 def _make_pencil(problem: Posed) -> tuple[Formula | None, int, int]:
-    """Entries of the matrices of a model, number of rows of each matrix, and number of matrices minus one."""
+    """Entries of the matrices of a model, number of rows of a matrix, and order (number of matrices minus one)."""
     model, parameter_set = problem.model, problem.parameter_set
-    if (
-        model.pencil is None or model.carrier is not None
-    ):  # the motion of a carrier is not a motion of the user's system
+    # With a carrier (added to the frequencies of a complex H), the motion is not the motion of the user's system.
+    if model.pencil is None or model.carrier is not None:
         return None, 0, 0
     matrices = model.pencil(parameter_set.native({n: symbol(n) for n in parameter_set.names}))
     return formula(e for matrix in matrices for row in matrix for e in row), len(matrices[0]), len(matrices) - 1
 
 
 def _compute_ride(problem: Posed, p: Mapping[str, Any]) -> list[Any]:
-    """Rates of lean and steer after a unit impulse of steer torque, M⁻¹ (0, 1), and the path of the contacts.
+    """Rates of lean and steer after a unit impulse of steer torque, M⁻¹ (0, 1), and five numbers of `contact_path`.
 
-    Time is in the unit of the model; torque and lengths are in those of the file.
+    Time is in the unit of the model; torque and lengths are in the units of the file.
     """
     model, parameter_set = problem.model, problem.parameter_set
     assert model.pencil is not None
@@ -166,7 +166,7 @@ def _compute_ride(problem: Posed, p: Mapping[str, Any]) -> list[Any]:
 
 
 def _write_operation(template: str, name_term: Callable[[str], str], *operands: str) -> str:
-    """The text of an operation; a name replaces operands that are used twice, and a long result."""
+    """The text of an operation. Operands that occur twice in it, and a long result, get a name."""
     is_repeated = [template.count(f"{{{k}}}") > 1 and _is_result(text) for k, text in enumerate(operands)]
     text = template.format(
         *(name_term(text) if is_named else text for text, is_named in zip(operands, is_repeated, strict=True))
@@ -179,7 +179,7 @@ def _write_power(name_term: Callable[[str], str], base: str, exponent: str) -> s
 
 
 def _strip_parentheses(text: str) -> str:
-    """A result without its outer parentheses, for a place without an operation around it."""
+    """A result without its outer parentheses, for use where no operation is around it."""
     return text[1:-1] if text.startswith("(") else text
 
 
@@ -188,20 +188,22 @@ def _is_result(text: str) -> bool:
     return re.fullmatch(r"[\w.\[\]]+", text) is None
 
 
-# The formulas for roots of polynomials are not written again in JavaScript: the functions of Python are traced. For
-# this, their names `where` and `as_integer` get another meaning. Formulas of quartics are from `tmsopt.roots.quartics`;
-# the conditions of stability for lower degrees are from `lienard_chipart`.
+# The formulas for roots of polynomials are not written a second time in JavaScript. Instead, the Python functions are
+# called with symbols, and their operations are recorded. The names `where` and `as_integer` in these functions then
+# stand for operations on symbols. Formulas of quartics are from `tmsopt.roots.quartics`; the conditions of stability for lower
+# degrees are from `lienard_chipart`.
 
 _QUARTIC = 4
 
 
 def kernel_script(degree: int) -> str:
-    """JavaScript functions for polynomials of a degree; they write results to arrays, so that no memory is allocated.
+    """JavaScript functions for polynomials of a degree. Several results go to an array, so that no memory is allocated.
 
     For s² + p s + q: ``factorAbscissa(p, q)``, ``factorDamping(p, q)``, and ``factorRoots(p, q, z)``, which writes real
-    and imaginary parts. Up to degree 4: ``stableBySigns(a0, …)``. For quartics: ``quarticStart(a0, …, f)``, for
-    b1 … b4, p1, q1, p2, q2 and the backward error; ``quarticStep(b1, …, q2, g)``, which writes better factors and their
-    error; ``quarticClass(a0, …)``, which is the code + 8 × the number of real roots, or 64 if a sign is uncertain.
+    and imaginary parts. Up to degree 4: ``stableBySigns(a0, …)``. For quartics: ``quarticStart(a0, …, f)``, which
+    writes b1 … b4, p1, q1, p2, q2 and the backward error; ``quarticStep(b1, …, q2, g)``, which writes better factors
+    and their error; ``quarticClass(a0, …)``, which returns the class code + 8 × the number of real roots, or 64 if a
+    sign is uncertain.
     """
     a = [f"a{k}" for k in range(degree + 1)]
     parts = [
@@ -227,7 +229,8 @@ _where = partial(make_node, "choose")
 _NAMESPACE: dict[str, Any] = {**vars(factors), **vars(signs)}
 for _name, _value in [*_NAMESPACE.items()]:
     if isinstance(_value, FunctionType):
-        _NAMESPACE[_name] = FunctionType(_value.__code__, _NAMESPACE, _name)  # they call each other here
+        # In this copy, the functions call one another in the new namespace.
+        _NAMESPACE[_name] = FunctionType(_value.__code__, _NAMESPACE, _name)
 _NAMESPACE |= {"where": _where, "as_integer": lambda condition: _where(condition, 1, 0)}
 _FUNCTIONS = SimpleNamespace(**_NAMESPACE)
 

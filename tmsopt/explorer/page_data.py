@@ -20,17 +20,18 @@ from tmsopt.problem.validate import MIN_SIZE
 from tmsopt.records import Array
 from tmsopt.tracing import domain, trace
 
-_CURVE_STARTS = 8  # starts for a traced curve; the grid of the tracer finds curves that they miss
-_CURVE_DIGITS, _MAX_CURVE_POINTS = 5, 80  # digits of a traced point, points of a curve; a chart has some 400 pixels
+_CURVE_STARTS = 8  # number of starts for a traced curve; the grid of the tracer finds curves that the starts miss
+_CURVE_DIGITS = 5  # digits of a traced point
+_MAX_CURVE_POINTS = 80  # points of a curve; a chart is about 400 pixels wide
 _SPEEDS, _TILT = ("v", "Fr"), "lambda_s"
-_DEFAULT_REACH = {"m": 0.5, "kg": 5.0, "kg m^2": 1.0, "rad": 0.5, "m/s": 5.0}
-"""Unit → largest value of the slider for a fixed parameter that is 0; it is 1 for other units."""
+_DEFAULT_SLIDER_END = {"m": 0.5, "kg": 5.0, "kg m^2": 1.0, "rad": 0.5, "m/s": 5.0}
+"""Unit → largest value of the slider for a fixed parameter that is 0; for other units this value is 1."""
 
 _IMPULSE_UNIT = "m_B g w √(w/g)"
 """Unit of an impulse of torque, for a dimensionless bicycle of two masses on skates."""
 
 _SHARED_PART = re.compile(r"\[(\d+)\]")  # reference to a part of a model that several formulas share
-_MIDDLE_NOTE = "nothing was solved here, so the page opens in the middle of the box"
+_MIDDLE_NOTE = "no problem was solved for this page, so the page opens in the middle of the ranges"
 
 
 def make_page_data(
@@ -39,7 +40,7 @@ def make_page_data(
     """The data of a page; numbers are in rad and SI units.
 
     Args:
-        designs: the page opens with the first one if that is an answer, else in the middle of the ranges.
+        designs: the page opens with the first design if it is an answer, else in the middle of the ranges.
         script: the formulas of the page; they determine which quantities and constraints it can compute.
         model: the table [model] of the problem's file; empty if there is none.
         trace_curves: whether to trace the boundaries of stability in the plane of the chart.
@@ -67,7 +68,7 @@ def make_page_data(
         ],
         "constraints": [_describe_constraint(problem, n) for n in script.constraints],
         "objective": f"{problem.sense} {' '.join(goal.split())}" if goal else "",
-        "designs": [_describe_design(problem, k) for k in designs],
+        "designs": [_describe_design(problem, design) for design in designs],
         "start": [start[n] for n in parameter_set.names],
         "plane": [parameter_set.names.index(n) for n in ranking[:2]],
         "over": parameter_set.names.index((speeds or ranking)[0]),
@@ -109,10 +110,10 @@ def _describe_parameter(problem: Posed, parameter: Parameter, value: float) -> d
 def _slider_range(parameter: Parameter, value: float) -> tuple[float, float]:
     """Range of the slider of a fixed parameter: from 1/5 of its value to twice its value, within its physical range.
 
-    It does not begin at 0, because many systems have no mass there.
+    The range does not begin at 0, where the mass of many systems would be 0.
     """
-    default_reach, limits = _DEFAULT_REACH.get(parameter.unit, 1.0), parameter.range
-    ends = sorted((0.2 * value, 2 * value)) if value else (-default_reach, default_reach)
+    default_end, limits = _DEFAULT_SLIDER_END.get(parameter.unit, 1.0), parameter.range
+    ends = sorted((0.2 * value, 2 * value)) if value else (-default_end, default_end)
     margin = 0.0 if limits.closed else 1e-3 * abs(value)
     low, high = (min(max(end, limits.lower + margin), limits.upper - margin) for end in ends)
     return low, high
@@ -132,8 +133,8 @@ def _describe_constraint(problem: Posed, name: str) -> dict[str, Any]:
 
 def _describe_design(problem: Posed, design: PageDesign) -> dict[str, Any]:
     structure = design.structure
-    # Growth rate, frequency and multiplicity of each root, for one root of a conjugate pair. For a complex matrix H of
-    # eigenfrequencies ω: Im ω, Re ω and multiplicity.
+    # Each root is (growth rate, frequency, multiplicity); of a conjugate pair only one root is listed. For a complex
+    # matrix H with eigenfrequencies ω, a root is (Im ω, Re ω, multiplicity).
     roots = [[w.im, w.re, w.multiplicity] for w in eigenfrequencies(problem.model, structure.roots)]
     roots = roots or [[r.re, r.im, r.multiplicity] for r in structure.roots if r.im >= 0]
     return {
@@ -143,7 +144,7 @@ def _describe_design(problem: Posed, design: PageDesign) -> dict[str, Any]:
         "abscissa": max((root[0] for root in roots), default=math.nan),
         "roots": roots,
         "facts": list(design.facts),
-        "proved": design.proved,
+        "proved": design.proof_text,
         **design.verdict,
     }
 
@@ -156,7 +157,7 @@ def _sort_by_interest(problem: Posed) -> list[str]:
 
 
 def _trace_curves(problem: Posed, plane: Sequence[str], start: Mapping[str, float]) -> Iterator[dict[str, Any]]:
-    """Curves in the plane of the chart: boundaries of stability and heavy damping, and the set that is located."""
+    """Curves in the plane of the chart: boundaries of stability and heavy damping, and points with the root pattern."""
     if len(plane) < 2 or not set(plane) <= set(problem.free):
         return
     nominal, index = problem.nominal, problem.parameter_set.names.index
@@ -179,7 +180,7 @@ def _trace_curves(problem: Posed, plane: Sequence[str], start: Mapping[str, floa
         yield {"kind": kind, "set": title, **axes, "x": x, "y": y}
 
 
-# The text of a problem file around its parameters, so that a design of a page can be saved as a problem file
+# The text of a problem file around its parameters: a page uses it to save its design as a problem file
 
 
 def surrounding_lines(problem: Posed, model: Mapping[str, Any]) -> dict[str, str]:
@@ -211,7 +212,7 @@ def _write_model(table: Mapping[str, Any]) -> Iterator[str]:
 
 
 def model_table(problem: Posed) -> dict[str, Any]:
-    """The table [model] of a model that was made in Python; each shared part is written where it is used."""
+    """The table [model] of a model that was made in Python. A part that formulas share is written in each."""
     statement = {n: v for n, v in (problem.model.statement or {}).items() if n != "parameters"}
     shared_parts = statement.pop("shared")
 

@@ -30,10 +30,10 @@ from tmsopt.search.solve import solve
 from tmsopt.tracing.domain import Domain
 
 Legend = tuple[list[Name], list[Artist]]
-"""Names of points, which are written later, and legend entries."""
+"""Names of points, which are written after everything else is drawn, and entries of the legend."""
 
 CLASS_COLOURS = ("#FFFFFF", "#BBBBBB", "#E6E6E6", "#A6D5F0", "#F2C45A")
-"""Fill colours of the classes from undefined to heavily damped; their lightness differs too."""
+"""Fill colours of the classes, from undefined to heavily damped. They also differ in lightness."""
 
 _BOUNDARY_STYLES = (
     ("parting", "between capsize and weave", CAPSIZE, 1.2),
@@ -43,7 +43,7 @@ _BOUNDARY_STYLES = (
 """Boundaries of a domain in the order in which they are drawn: field, label, colour and line width."""
 
 _COLOUR_PERCENTILES = (1, 95)
-"""The colours cover a layer between these percentiles, so that poles of the abscissa do not take all of them."""
+"""The colours cover a layer between these percentiles, so that poles of the abscissa do not use up all colours."""
 
 _ARC_STYLES: Mapping[str, tuple[LineStyleType, str]] = {
     "capsize": ("-.", " (root 0)"),
@@ -63,7 +63,7 @@ def draw_layer(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> Legend:
         _fill(ax, chart, plane, layer, cmap=ListedColormap(CLASS_COLOURS), vmin=-0.5, vmax=len(CLASSES) - 0.5)
     else:
         _fill_numbers(ax, chart, plane, layer)
-    names, curves = domain_curves(ax, chart.domain, plane, model)
+    names, curves = draw_domain_curves(ax, chart.domain, plane, model)
     return names, [*handles, *curves, *_hatch_violations(ax, chart, plane)]
 
 
@@ -78,27 +78,27 @@ def _fill(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str, **look: Any) -> 
 def class_handles(kind: NDArray[np.int8], model: Model) -> list[Patch]:
     """Legend entries of the classes that occur."""
     prefix = "unstable by" if model.carrier is None else "gain, beyond"
-    words = {kind: f"{prefix} {word}" for kind, word in events_of(model).items()}
+    labels = {event: f"{prefix} {name}" for event, name in events_of(model).items()}
     return [
-        Patch(facecolor=CLASS_COLOURS[code], edgecolor="grey", label=words.get(CLASSES[code], CLASSES[code]))
+        Patch(facecolor=CLASS_COLOURS[code], edgecolor="grey", label=labels.get(CLASSES[code], CLASSES[code]))
         for code in np.unique(kind)
     ]
 
 
-def domain_curves(ax: Axes, domain: Domain | None, plane: PlaneAxes, model: Model = tms) -> Legend:
+def draw_domain_curves(ax: Axes, domain: Domain | None, plane: PlaneAxes, model: Model = tms) -> Legend:
     """Draw the boundaries of stability and of heavy damping as curves, and mark their corners.
 
     Args:
-        model: its words are used for the corners.
+        model: the model whose names are used for the corners.
     """
     names, handles = list[Name](), list[Artist]()
     if domain is None:
         return names, handles
-    for name, words, colour, width in _BOUNDARY_STYLES:
+    for name, label, colour, width in _BOUNDARY_STYLES:
         outline = withStroke(linewidth=width + 1.2, foreground="white", alpha=0.6)
         for arc in getattr(domain, name):
             style, suffix = _ARC_STYLES.get(arc.kind, ("-", ""))
-            look: dict[str, Any] = {"color": colour, "linestyle": style, "linewidth": width, "label": words + suffix}
+            look: dict[str, Any] = {"color": colour, "linestyle": style, "linewidth": width, "label": label + suffix}
             handles += ax.plot(*plane.to_axis(arc.points), path_effects=[outline], **look)
     for corner in domain.corners:
         x, y = plane.to_axis(corner.parameters)
@@ -114,7 +114,7 @@ def plane_of(chart: Chart) -> PlaneAxes:
         InputError: for a chart over three parameters.
     """
     if len(chart.axes) != 2:
-        message = f"found {len(chart.axes)} parameters; a picture shows a plane: chart two, with the third one fixed"
+        message = f"found {len(chart.axes)} parameters; a picture shows a plane; chart two of them, and fix the third"
         raise input_error(message, "axes")
     return plane_over(chart.problem.posed, *chart.axes)
 
@@ -143,22 +143,22 @@ def draw_domain(
     plane = plane_over(problem.posed if problem else None, horizontal, vertical, *varying_names)
     ax = ensure_axes(ax, 6.4, 5.0, problem.title if problem else "")
     plane.label(ax)
-    return finish_axes(ax, *domain_curves(ax, data, plane, problem.model if problem else tms))
+    return finish_axes(ax, *draw_domain_curves(ax, data, plane, problem.model if problem else tms))
 
 
 def draw_chart(
     data: Chart, ax: Axes | None = None, layer: str = "kind", design: Solution | None = None, optimum: bool = True
 ) -> Axes:
-    """A chart with its exact boundaries on top, hatched where a constraint is violated.
+    """Draw a chart with its exact boundaries on top, hatched where a constraint is violated.
 
-    The Axes show the plane in the units of the file. For the abscissa, blue decays and red grows, white is 0, contours
-    have their numbers, and a star marks the optimum where the problem asks for one (it is solved for it), else the
-    least abscissa of the grid among what the constraints allow.
+    The Axes show the plane in the units of the file. The abscissa is blue where motion decays, red where it grows, and
+    white at 0; its contours have numbers. A star marks the optimum if the problem has an objective or a pattern (the
+    problem is then solved), otherwise the least abscissa on the grid that the constraints allow.
 
     Args:
         layer: ``kind``, ``abscissa``, ``damping_ratio``, ``real_roots`` or a quantity of the chart.
         design: a solution to mark.
-        optimum: whether to mark that.
+        optimum: whether to draw the star on the layer ``abscissa``.
 
     Raises:
         InputError: for a chart over three parameters, or a layer that it does not have.
@@ -166,7 +166,7 @@ def draw_chart(
     Example:
         >>> chart = tmsopt.chart("problems/chart.toml", points=(20, 20))
         >>> axes = tmsopt.plots.draw_chart(chart, design=tmsopt.solve("problems/ep4.toml"))
-        >>> [text.get_text() for text in axes.texts]  # the design stands at the corner of heavy damping
+        >>> [text.get_text() for text in axes.texts]  # the design is at the corner of heavy damping
         ['EP4, design']
 
     More: docs/how_to/charts.md
@@ -179,8 +179,8 @@ def draw_chart(
     if layer == "abscissa" and optimum:
         handles += _draw_optimum(ax, data, plane)
     if design is not None:
-        x, y = place = plane.to_axis(design.parameters)
-        handles += _draw_mark(ax, place, "D", f"the design ({design.structure})")
+        x, y = point = plane.to_axis(design.parameters)
+        handles += _draw_mark(ax, point, "D", f"the design ({design.structure})")
         names.append(Name("design", x, y))
     return finish_axes(ax, names, handles)
 
@@ -216,19 +216,19 @@ def _hatch_violations(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Artist]:
 
 
 def _fill_numbers(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> None:
-    """Draw the abscissa, damping ratio, number of real roots or a quantity, with its colour bar."""
-    bar: dict[str, Any] = {"label": _LAYER_LABELS.get(layer, layer), "extend": "both"}
+    """Draw a layer of numbers, such as the abscissa or a quantity, with its colour bar."""
+    bar_options: dict[str, Any] = {"label": _LAYER_LABELS.get(layer, layer), "extend": "both"}
     values = np.ma.masked_invalid(np.asarray(chart.layers[layer], dtype=float))
     low, high = np.percentile(values.compressed(), _COLOUR_PERCENTILES) if values.count() else (0.0, 1.0)
     look = {"cmap": "cividis", "vmin": low, "vmax": high}
     if layer == "real_roots":
-        numbers = chart.problem.model.degree + 1
-        look = {"cmap": colormaps["cividis"].resampled(numbers), "vmin": -0.5, "vmax": numbers - 0.5}
-        bar |= {"ticks": range(numbers), "extend": "neither"}
+        count = chart.problem.model.degree + 1
+        look = {"cmap": colormaps["cividis"].resampled(count), "vmin": -0.5, "vmax": count - 0.5}
+        bar_options |= {"ticks": range(count), "extend": "neither"}
     elif layer == "abscissa":
         limit = max(abs(low), abs(high)) or 1.0
         look = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
-        bar["label"] = abscissa_label(chart.problem.posed)
+        bar_options["label"] = abscissa_label(chart.problem.posed)
         grid = _axis_values(chart, plane)
         levels = [x for x in MaxNLocator(9).tick_values(low, high) if low <= x <= high and x != 0]
         contours = ax.contour(*grid, values, levels=levels, colors="0.15", linewidths=0.6)
@@ -236,7 +236,7 @@ def _fill_numbers(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> None:
             text.set_path_effects([withStroke(linewidth=1.5, foreground="white")])
         if chart.domain is None:
             ax.contour(*grid, values, levels=[0.0], colors=LINE, linewidths=1.6)
-    figure_of(ax).colorbar(_fill(ax, chart, plane, layer, **look), ax=ax, **bar)
+    figure_of(ax).colorbar(_fill(ax, chart, plane, layer, **look), ax=ax, **bar_options)
 
 
 def _draw_optimum(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Line2D]:
@@ -252,16 +252,16 @@ def _draw_optimum(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Line2D]:
             quantity = "largest Im ω" if is_complex else "abscissa"
             label = f"optimum ({solution.structure}), {quantity} {solution.abscissa:.4g}"
             return _draw_mark(ax, plane.to_axis(solution.parameters), "*", label)
-    allowed = np.isfinite(chart.abscissa) & chart.layers.get("satisfied", np.True_)
-    if not allowed.any():
+    is_allowed = np.isfinite(chart.abscissa) & chart.layers.get("satisfied", np.True_)
+    if not is_allowed.any():
         return []
-    values = np.where(allowed, chart.abscissa, np.inf)
+    values = np.where(is_allowed, chart.abscissa, np.inf)
     row, column = np.unravel_index(values.argmin(), values.shape)
     x, y = _axis_values(chart, plane)
     label = f"{'best Im ω' if is_complex else 'least abscissa'} on the grid, {values[row, column]:.4g}"
     return _draw_mark(ax, (x[column], y[row]), "*", label)
 
 
-def _draw_mark(ax: Axes, place: Iterable[float], marker: str, label: str) -> list[Line2D]:
+def _draw_mark(ax: Axes, point: Iterable[float], marker: str, label: str) -> list[Line2D]:
     size, yellow = 12 if marker == "*" else 6, "#F0E442"
-    return ax.plot(*place, marker, color=yellow, mec=LINE, markersize=size, zorder=6, label=label, clip_on=False)
+    return ax.plot(*point, marker, color=yellow, mec=LINE, markersize=size, zorder=6, label=label, clip_on=False)

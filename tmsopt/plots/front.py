@@ -27,13 +27,13 @@ _STYLES = {
 
 
 def _find_style(structure: str) -> tuple[str, str]:
-    """Colour and marker of a structure; roots of multiplicity 5 or more look like EP4, such complex pairs like CEP2."""
-    higher = re.fullmatch(r"(C?)EP\d+", structure)
-    return _STYLES.get(structure) or (_STYLES["CEP2" if higher[1] else "EP4"] if higher else (LINE, "x"))
+    """Colour and marker of a structure. An EPk with k > 4 looks like EP4, and a CEPk with k > 2 like CEP2."""
+    match = re.fullmatch(r"(C?)EP\d+", structure)
+    return _STYLES.get(structure) or (_STYLES["CEP2" if match[1] else "EP4"] if match else (LINE, "x"))
 
 
 def draw_front(data: Front, ax: Axes | None = None) -> Axes:
-    """Draw a front: of two objectives as a curve with gaps, of three as points, with the third objective as colour.
+    """Draw a front: a curve with gaps for two objectives, or points for three, whose colour is the third objective.
 
     The Axes show the first two objectives in the units of the file. Colour and marker of a point show the structure of
     its rightmost roots. Points that are not stable are hollow and have a ring, and the curve between them is dashed.
@@ -59,7 +59,7 @@ def draw_front(data: Front, ax: Axes | None = None) -> Axes:
         points = ax.scatter(values[:, 0], values[:, 1], 22, values[:, 2], zorder=3)
         figure_of(ax).colorbar(points, ax=ax, label=scales[2].label)
     rings = values[[not p.stable for p in data.points], :2]
-    if len(rings):  # not stable, or stability unknown
+    if len(rings):  # designs that are not stable, or whose stability is unknown
         ax.plot(*rings.T, "o", color=LINE, markerfacecolor="none", markersize=8, zorder=2.5, label="not stable")
     ax.margins(0.08)
     return finish_axes(ax, _name_points(data.points, values))
@@ -82,15 +82,15 @@ def front_figure(front: Front) -> Figure:
 def _draw_curve(ax: Axes, front: Front, values: Array) -> None:
     """Draw the curve of two objectives with its gaps, and the points with colours for the structure of their roots."""
     gaps = {gap.index: gap for gap in front.gaps}
-    stable = [bool(p.stable) for p in front.points]
+    stability = [bool(p.stable) for p in front.points]
     for k, piece in enumerate(np.stack([values[:-1], values[1:]], axis=-1)):
-        colour, style = (LINE, "-") if stable[k] and stable[k + 1] else (MARK, "--")
+        colour, style = (LINE, "-") if stability[k] and stability[k + 1] else (MARK, "--")
         look: dict[str, Any] = {"color": colour, "linestyle": style, "linewidth": 1}
         if k in gaps:
             label = "not solved" if gaps[k].failed else "gap: no efficient design"
             look = {"color": CAPSIZE, "linestyle": ":", "linewidth": 0.8, "label": label}
         ax.plot(*piece, **look)
-    kinds = [(p.structure, s) for p, s in zip(front.points, stable, strict=True)]
+    kinds = [(p.structure, is_stable) for p, is_stable in zip(front.points, stability, strict=True)]
     for structure, is_stable in dict.fromkeys(kinds):
         group, (colour, marker) = values[[kind == (structure, is_stable) for kind in kinds]], _find_style(structure)
         fill = colour if is_stable else "white"
@@ -98,7 +98,7 @@ def _draw_curve(ax: Axes, front: Front, values: Array) -> None:
 
 
 def _name_points(points: tuple[FrontPoint, ...], values: Array) -> list[Name]:
-    """Names of the ends, and of kinks where the structure changes. Kinks where only limits change have no name."""
+    """Names of the ends, and of kinks where the structure changes. Other kinks have no name."""
     words = [[w for w in p.label.split("; ") if "->" in w or w.startswith(("least", "greatest"))] for p in points]
-    places = values[:, :2].tolist()
-    return [Name(", ".join(w).replace("->", "→"), *place) for w, place in zip(words, places, strict=True) if w]
+    positions = values[:, :2].tolist()
+    return [Name(", ".join(w).replace("->", "→"), *position) for w, position in zip(words, positions, strict=True) if w]

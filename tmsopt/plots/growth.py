@@ -1,4 +1,4 @@
-"""Draw growth rates and frequencies of modes over the speed or another parameter, and its events as a ruler."""
+"""Draw growth rates and frequencies of modes over the speed or another parameter, and events along it as a ruler."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ from tmsopt.plots.style import (
     ensure_axes,
     legend_below,
     new_figure,
-    note,
+    write_note,
 )
 from tmsopt.problem.solution import Solution
 from tmsopt.records import Array
@@ -56,7 +56,7 @@ _ROUNDING = 1e-12  # a value below this fraction of the range is shown as 0
 
 _VERTICAL_MARGIN = 0.08  # fraction of the range of values that is free above and below the curves of a complex H
 
-_NAME_HEIGHTS = 3  # number of heights at which the names of events stand in turn
+_LEVEL_COUNT = 3  # the names of events stand at so many heights in turn
 _END_FACTOR = 1.15  # the ruler ends at this multiple of the last event
 
 _Curve = tuple[Mode, Array]
@@ -67,8 +67,8 @@ def draw_growth(data: Growth | Solution, ax: Axes | None = None) -> Axes:
     """Draw the growth rates of all modes over the speed or another parameter.
 
     The Axes show Re s, in 1/s for a problem in SI, over the parameter in the unit of the problem's file. Each mode has
-    its name. Bands show stability and heavy damping; lines show the values where a mode loses stability and the value
-    of the design, with numbers in the legend; circles show where roots meet. For a complex H the Axes show Im ω of
+    its name. Bands show stability and heavy damping. Lines show the values where a mode loses stability, and the value
+    of the design; the legend has these values. Circles show where roots meet. For a complex H the Axes show Im ω of
     every eigenfrequency, and no part of a curve is cut off.
 
     Example:
@@ -115,9 +115,9 @@ def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: f
     data = growth(data) if isinstance(data, Solution) else data
     axes_names = [(ax, draw_curves(ax, data, part)) for ax, part in ((upper, "real"), (lower, "imag"))]
     upper.set_xlabel("")
-    if (unit := metres_per_second) is not None and data.over.name == "Fr":
-        speed = upper.secondary_xaxis("top", functions=(lambda x: x * unit, lambda x: x / unit))
-        speed.set_xlabel("speed $v$ in m/s")
+    if (speed_unit := metres_per_second) is not None and data.over.name == "Fr":
+        speed_axis = upper.secondary_xaxis("top", functions=(lambda x: x * speed_unit, lambda x: x / speed_unit))
+        speed_axis.set_xlabel("speed $v$ in m/s")
     figure.suptitle(title or data.problem.title, fontsize=11)
     legend_below(figure, upper.get_legend_handles_labels()[0])
     place_all(axes_names)
@@ -146,11 +146,13 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
     high = data.upper if math.isfinite(data.upper) else max(last_value, _END_FACTOR * design_value)
     draw_bands(ax, *(scale.to_axis(np.minimum(bands, high)) for bands in (data.stable, data.heavily_damped)))
     for k, event in enumerate(data.found):
-        x, height = float(scale.to_axis(event.at)), 0.95 - 0.62 * (k % _NAME_HEIGHTS) / _NAME_HEIGHTS
+        x, height = float(scale.to_axis(event.at)), 0.95 - 0.62 * (k % _LEVEL_COUNT) / _LEVEL_COUNT
         colour, _ = EVENTS.get(event.kind, (REAL, ""))
         ax.plot([x, x], [0, height], color=colour, linewidth=2.0 if event.changes else 0.9)
-        side = 3 if event.at < (data.lower + high) / 2 else -3
-        note(ax, f"{words.get(event.kind, event.kind)} {x:.4g}", (x, height), (side, 0), verticalalignment="top")
+        offset = 3 if event.at < (data.lower + high) / 2 else -3
+        write_note(
+            ax, f"{words.get(event.kind, event.kind)} {x:.4g}", (x, height), (offset, 0), verticalalignment="top"
+        )
     if data.parameter in data.parameters:
         label = f"design at {scale.unit.show(design_value, 4)}"
         ax.plot(scale.to_axis(design_value), 0.06, "^", color=LINE, label=label, clip_on=False)
@@ -171,11 +173,11 @@ def draw_curves(ax: Axes, data: Growth, part: str) -> list[Name]:
     draw_bands(ax, scale.to_axis(data.stable), scale.to_axis(data.heavily_damped))
     names = list(dict.fromkeys(mode.name for mode in sorted(data.modes, key=lambda m: _rank_mode(m, data.design))))
     modes = [m for m in data.modes if part == "real" or is_complex or m.roots.imag.any()]
-    curves = [(m, _heights(data, m.values, m.roots, part)) for m in modes]
+    curves = [(m, _compute_heights(data, m.values, m.roots, part)) for m in modes]
     for mode, y in curves:
-        place = names.index(mode.name)
-        colour, style = _STYLES.get(mode.name, [*_STYLES.values()][place % len(_STYLES)])
-        level = 2 + 0.01 * place  # solid lines below dashed ones
+        index = names.index(mode.name)
+        colour, style = _STYLES.get(mode.name, [*_STYLES.values()][index % len(_STYLES)])
+        level = 2 + 0.01 * index  # solid lines are drawn below dashed lines
         ax.plot(scale.to_axis(mode.values), y, color=colour, linestyle=style, zorder=level)
     _draw_marks(ax, data, scale, part)
     start = min(0.0, data.values[0]) if data.over.name in SPEEDS else data.values[0]
@@ -192,13 +194,13 @@ def draw_curves(ax: Axes, data: Growth, part: str) -> list[Name]:
     if is_complex:
         kind = "EP{}" if "EP" in data.structure else "{}-fold"
         for root, (value, multiple_root) in zip(data.multiple, _list_multiple_roots(data), strict=True):
-            height = _heights(data, value, multiple_root, part).item()
+            height = _compute_heights(data, value, multiple_root, part).item()
             mode_names.append(Name(kind.format(root.multiplicity), scale.to_axis(value).item(), height))
     return mode_names
 
 
-def _heights(data: Growth, values: Any, roots: Any, part: str) -> Array:
-    """Growth rates or frequencies, in the units of the axis, of roots at values of the parameter; for H, ω = i s."""
+def _compute_heights(data: Growth, values: Any, roots: Any, part: str) -> Array:
+    """Heights of roots in the Axes at parameter values: growth rates or frequencies; for a complex H, ω = i s."""
     heights = np.asarray(getattr(np.asarray(roots), part), dtype=float)
     if data.rate is not None:
         heights = heights * np.interp(values, data.values, data.rate) / (1 if part == "real" else 2 * np.pi)
@@ -222,28 +224,28 @@ def _draw_marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
     design_value = data.design if abs(data.design) > _ROUNDING * np.ptp(data.values) else 0.0
     label = f"design at {scale.to_axis(design_value):.4g}{unit}{structure}"
     ax.axvline(float(scale.to_axis(data.design)), color=LINE, linestyle=":", label=label)
-    meetings = [(c.at, complex(c.root.re, c.root.im)) for c in data.events if "EP" in c.kind]
-    meetings += _list_multiple_roots(data)
-    if meetings:
-        values, roots = zip(*meetings, strict=True)
+    multiple_roots = [(c.at, complex(c.root.re, c.root.im)) for c in data.events if "EP" in c.kind]
+    multiple_roots += _list_multiple_roots(data)
+    if multiple_roots:
+        values, roots = zip(*multiple_roots, strict=True)
         label = "eigenfrequencies meet" if _is_complex_H(data) else "roots meet"
-        x, y = scale.to_axis(values), _heights(data, values, roots, part)
+        x, y = scale.to_axis(values), _compute_heights(data, values, roots, part)
         ax.plot(x, y, "o", color=LINE, markerfacecolor="white", zorder=4, label=label)
     if part == "real":
         ax.axhline(0, color="grey", linewidth=0.6, zorder=1)
 
 
 def _find_limits(data: Growth, curves: Sequence[_Curve], part: str) -> tuple[float, float]:
-    """Limits of the vertical axis that suit the roots near the design and the events, even if other roots are large."""
+    """Limits of the vertical axis that show the roots near the design and the events, even if other roots are large."""
     heights = [y for _, y in curves]
     if part == "real":
         centres = [data.design, *(c.at for c in data.events if c.kind in ("weave", "capsize"))]
-        room = 0.25 * abs(data.design) + 0.05 * (data.values[-1] - data.values[0])
-        low, high = min(centres) - room, max(centres) + room
+        distance = 0.25 * abs(data.design) + 0.05 * (data.values[-1] - data.values[0])
+        low, high = min(centres) - distance, max(centres) + distance
         heights = [y[(m.values >= low) & (m.values <= high)] for m, y in curves]
     bottom, top = np.percentile(np.concatenate([*heights, [0.0]]), (1, 99)) * (part == "real", 1)
-    room = 0.2 * (top - bottom) or 0.1
-    return bottom - room * (part == "real"), top + room
+    margin = 0.2 * (top - bottom) or 0.1
+    return bottom - margin * (part == "real"), top + margin
 
 
 def _name_modes(ax: Axes, scale: AxisScale, curves: Sequence[_Curve]) -> list[Name]:
@@ -260,7 +262,7 @@ def _name_modes(ax: Axes, scale: AxisScale, curves: Sequence[_Curve]) -> list[Na
 
 
 def _list_multiple_roots(data: Growth) -> list[tuple[float, complex]]:
-    """The multiple roots of the design as (value of the parameter, root); of two conjugates, the upper one."""
+    """The multiple roots of the design as (value of the parameter, root), without lower conjugates."""
     return [(data.design, complex(r.re, r.im)) for r in data.multiple if r.im >= 0 or _is_complex_H(data)]
 
 

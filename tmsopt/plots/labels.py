@@ -1,4 +1,4 @@
-"""Write names beside marked points, labels and units on axes, and legends."""
+"""Write names next to marked points, labels and units on axes, and legends."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from tmsopt.records import Array
 
 _FONT_SIZE = 8
 
-_SAME_POINT = 0.02  # marks that are closer than this fraction of an axis share one label, to avoid confusion
+_SAME_POINT = 0.02  # points that are closer than this fraction of an axis share one label
 
 COMPLEX_H_LABELS = {"real": r"$\mathrm{Im}\,\omega$ (loss negative)", "imag": r"$\mathrm{Re}\,\omega$"}
 """Axis labels of the real and imaginary parts of s = −i ω for a complex H (a matrix with gain or loss)."""
@@ -61,7 +61,7 @@ class AxisScale(NamedTuple):
 
 
 class PlaneAxes(NamedTuple):
-    """The axes of a plane."""
+    """The two axes of a plane."""
 
     horizontal: AxisScale
     vertical: AxisScale
@@ -76,9 +76,9 @@ class PlaneAxes(NamedTuple):
 
 
 def plane_over(problem: Posed | None, *names: str | None) -> PlaneAxes:
-    """The plane of the first two names that are not None, in the units of the problem; without one, SI and rad."""
-    first, second, *_ = (*filter(None, names), "", "")
-    return PlaneAxes(*(scale_of(problem, n) if problem else AxisScale(n, n) for n in (first, second)))
+    """The plane of the first two names that are not None, in the units of the problem, or else in SI and rad."""
+    chosen_names = (*filter(None, names), "", "")[:2]
+    return PlaneAxes(*(scale_of(problem, n) if problem else AxisScale(n, n) for n in chosen_names))
 
 
 def scale_of(problem: Posed, text: str) -> AxisScale:
@@ -118,16 +118,16 @@ def events_of(model: Model) -> dict[str, str]:
 
 
 def finish_axes(ax: Axes, names: Sequence[Name] = (), handles: Sequence[Artist] | None = None) -> Axes:
-    """Draw the legend, and the names beside their points; return the Axes."""
+    """Draw the legend, and the names next to their points; return the Axes."""
     draw_legend(ax, ax.get_legend_handles_labels()[0] if handles is None else handles)
     place_names(ax, names)
     return ax
 
 
 def place_names(ax: Axes, names: Sequence[Name]) -> None:
-    """Write names beside their points, away from curves, other names and the frame.
+    """Write names next to their points, away from curves, other names and the frame.
 
-    The limits of the Axes must be set before. Points at the same place share one label.
+    The limits of the Axes must be set before. Points that almost coincide share one label.
 
     Example:
         >>> axes = tmsopt.plots.new_figure(3, 3).subplots()  # from 0 to 1
@@ -152,28 +152,28 @@ def place_all(axes_names: Sequence[tuple[Axes, Sequence[Name]]]) -> None:
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for ax, names in axes_names:
-        _place(ax, names)
+        _place_in_axes(ax, names)
     figure.set_layout_engine(engine)
 
 
-def _place(ax: Axes, names: Sequence[Name]) -> None:
+def _place_in_axes(ax: Axes, names: Sequence[Name]) -> None:
     low, high = np.sort([ax.get_xlim(), ax.get_ylim()]).T
-    merged: dict[tuple[float, float], list[str]] = {}
+    points: dict[tuple[float, float], list[str]] = {}  # position → texts that are written there
     for name in names:
-        place = name.x, name.y
-        if np.array_equal(np.clip(place, low, high), place):
-            neighbours = (p for p in merged if np.all(np.abs(np.subtract(p, place)) <= _SAME_POINT * (high - low)))
-            words = merged.setdefault(next(neighbours, place), [])
-            words += [name.text] * (name.text not in words)
-    if not merged:
+        point = name.x, name.y
+        if np.array_equal(np.clip(point, low, high), point):
+            neighbours = (p for p in points if np.all(np.abs(np.subtract(p, point)) <= _SAME_POINT * (high - low)))
+            texts = points.setdefault(next(neighbours, point), [])
+            texts += [name.text] * (name.text not in texts)
+    if not points:
         return
-    x, y = np.array([*merged]).T
+    x, y = np.array([*points]).T
     curves = [xy.T for line in ax.get_lines() for xy in _visible_pieces(ax, line.get_xydata())]
     textalloc.allocate(
         ax,
         x,
         y,
-        [", ".join(words) for words in merged.values()],
+        [", ".join(texts) for texts in points.values()],
         x_scatter=x,
         y_scatter=y,
         x_lines=[xy[0] for xy in curves],

@@ -1,6 +1,6 @@
-"""Draw what an optimum means: effect of rounding, distance to the boundaries, comparison with laws, all designs.
+"""Draw facts about an optimum: effect of rounding, distance to the boundaries, comparison with laws, all designs.
 
-The ledger, which lists the claims of the paper with their verdicts, is drawn here too.
+This module also draws the ledger, which lists the claims of the paper with their verdicts.
 """
 
 from collections.abc import Sequence
@@ -16,11 +16,11 @@ from tmsopt.evaluation.law_rows import SAME_LAW
 from tmsopt.models import words_of
 from tmsopt.paper import Comparison, Ledger
 from tmsopt.plots.labels import Name, abscissa_label, finish_axes, scale_of
-from tmsopt.plots.style import CRITICAL, STABLE, ensure_axes, note
+from tmsopt.plots.style import CRITICAL, STABLE, ensure_axes, write_note
 from tmsopt.search import Every
 
 _MIN_BAR = 1e-17  # shortest bar on a logarithmic axis, also for 0; less than the rounding of doubles near 1
-_MIN_SHARE = 1e-3  # parts that are smaller than this fraction of the distance are not shown
+_MIN_SHARE = 1e-3  # a change smaller than this fraction of the distance is not shown
 _BOUNDARY_NAMES = {"infinity": "a root at infinity", "heavy damping": "the edge of heavy damping"}
 
 
@@ -57,7 +57,7 @@ def draw_rounding(data: Explanation, ax: Axes | None = None) -> Axes:
 def draw_robustness(data: Robustness | Nearest, ax: Axes | None = None) -> Axes:
     """Draw the smallest change of the parameters that leads to a boundary (for a `Robustness`, to the nearest one).
 
-    The Axes show the part of each parameter, in units of its weight, or in % if there are no weights. The title says
+    The Axes show the change of each parameter, in units of its weight, or in % if there are no weights. The title says
     how far away the boundaries are.
 
     Example:
@@ -74,18 +74,18 @@ def draw_robustness(data: Robustness | Nearest, ax: Axes | None = None) -> Axes:
         boundaries = [n for n in (data.weave, data.capsize, data.infinity, data.heavy_damping) if n.found]
         if data.relative:
             factor, unit = 100.0, "\N{NO-BREAK SPACE}%"
-    parts = [(n, factor * x, False) for n, x in nearest.direction.items() if abs(x) > _MIN_SHARE * nearest.distance]
-    parts.sort(key=lambda part: -abs(part[1]))
-    ax = ensure_axes(ax, 6.0, 1.3 + 0.26 * len(parts))
+    changes = [(n, factor * x, False) for n, x in nearest.direction.items() if abs(x) > _MIN_SHARE * nearest.distance]
+    changes.sort(key=lambda change: -abs(change[1]))
+    ax = ensure_axes(ax, 6.0, 1.3 + 0.26 * len(changes))
     distances = ", ".join(f"{words.get(n.kind, n.kind)} at {factor * n.distance:.3g}{unit}" for n in boundaries)
     ax.set_title(fill(distances, 62) or "no boundary found", fontsize=9.5)
-    _draw_bars(ax, parts)
+    _draw_bars(ax, changes)
     ax.axvline(0, color="grey", linewidth=0.6)
-    if not parts:
+    if not changes:
         message = "the design is on the boundary" if nearest.found else "none was found"
         ax.text(0.5, 0.5, message, transform=ax.transAxes, horizontalalignment="center", fontsize=9)
-    towards = f"change towards {words.get(nearest.kind, nearest.kind)}"
-    ax.set_xlabel(f"{towards} in {unit.strip() or 'units of the weights'}")
+    label = f"change towards {words.get(nearest.kind, nearest.kind)}"
+    ax.set_xlabel(f"{label} in {unit.strip() or 'units of the weights'}")
     return finish_axes(ax)
 
 
@@ -126,7 +126,7 @@ def draw_ledger(data: Ledger, ax: Axes | None = None) -> Axes:
     ax = ensure_axes(ax, 6.0, 1.2 + 0.3 * len(data.counts), f"{len(data.entries)} claims of the paper")
     _draw_bars(ax, [(verdict, count, False) for verdict, count in data.counts.items()])
     for k, count in enumerate(data.counts.values()):
-        note(ax, str(count), (count, k), (4, 0), verticalalignment="center")
+        write_note(ax, str(count), (count, k), (4, 0), verticalalignment="center")
     ax.margins(x=0.12)
     ax.set_xlabel("claims")
     return finish_axes(ax)
@@ -162,19 +162,19 @@ def draw_designs(data: Every, ax: Axes | None = None) -> Axes:
         fill_colour, label = (CRITICAL, "proved") if is_proved else ("white", "found")
         ax.plot(*point, "o", color=CRITICAL, markerfacecolor=fill_colour, label=label)
     return finish_axes(
-        ax, [Name(f"{d.abscissa:.4g}", *at) for d, at in zip(data.solutions, points.tolist(), strict=True)]
+        ax, [Name(f"{d.abscissa:.4g}", *point) for d, point in zip(data.solutions, points.tolist(), strict=True)]
     )
 
 
-def _draw_bars(ax: Axes, bars: Sequence[tuple[str, float, bool]], words: tuple[str, str] = ("", "")) -> None:
+def _draw_bars(ax: Axes, bars: Sequence[tuple[str, float, bool]], labels: tuple[str, str] = ("", "")) -> None:
     """Draw horizontal bars, the first one at the top.
 
     Args:
         bars: name, length, and whether the bar belongs to the second kind, which is hatched.
-        words: labels of the two kinds.
+        labels: labels of the first and the second kind in the legend.
     """
-    for place, (_, length, is_second) in enumerate(bars):
+    for index, (_, length, is_second) in enumerate(bars):
         colour, hatch = (STABLE, "//") if is_second else (CRITICAL, "")
-        ax.barh(place, length, 0.7, color=colour, hatch=hatch, edgecolor="white", label=words[is_second])
+        ax.barh(index, length, 0.7, color=colour, hatch=hatch, edgecolor="white", label=labels[is_second])
     ax.set_yticks(range(len(bars)), [name for name, *_ in bars], fontsize=8)
     ax.invert_yaxis()

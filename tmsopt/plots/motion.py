@@ -11,13 +11,13 @@ from tmsopt.plots.labels import finish_axes
 from tmsopt.plots.style import COMPLEX, CRITICAL, HEAVY, LINE, MARK, REAL, ensure_axes, new_figure
 
 _COLOURS = (CRITICAL, MARK, REAL, HEAVY, COMPLEX, LINE)
-_LATEX = {"phi": r"lean $\varphi$", "delta": r"steer $\delta$", "T_phi": r"lean torque", "T_delta": r"steer torque"}
+_LABELS = {"phi": r"lean $\varphi$", "delta": r"steer $\delta$", "T_phi": r"lean torque", "T_delta": r"steer torque"}
 
 
 def draw_motion(motion: Simulation, ax: Axes | None = None) -> Axes:
     """Draw lean and steer in degrees over time, or the coordinates of a system that the user defined.
 
-    The time after which all of them have settled is grey.
+    The time after which all curves have settled is grey.
 
     Example:
         >>> axes = tmsopt.plots.draw_motion(tmsopt.simulate("problems/ep4.toml", lean=5))
@@ -43,11 +43,15 @@ def motion_figure(motion: Simulation) -> Figure:
 
     More: docs/how_to/motion.md
     """
-    parts = [_draw_angles, *[_draw_torques] * ("T_delta" in motion.columns), *[_draw_path] * ("x" in motion.columns)]
-    figure = new_figure(6.4, 1.0 + 2.4 * len(parts))
-    axes = figure.subplots(len(parts), 1, squeeze=False)[:, 0]
+    draw_functions = [
+        _draw_angles,
+        *[_draw_torques] * ("T_delta" in motion.columns),
+        *[_draw_path] * ("x" in motion.columns),
+    ]
+    figure = new_figure(6.4, 1.0 + 2.4 * len(draw_functions))
+    axes = figure.subplots(len(draw_functions), 1, squeeze=False)[:, 0]
     axes[0].set_title(motion.problem.title, fontsize=11)
-    for draw, ax in zip(parts, axes, strict=True):
+    for draw, ax in zip(draw_functions, axes, strict=True):
         draw(motion, ax)
         finish_axes(ax)
     return figure
@@ -57,9 +61,9 @@ def _draw_angles(motion: Simulation, ax: Axes) -> None:
     names = [m.name for m in motion.measures if not m.name.startswith("T_")]
     scale, label = (180 / np.pi, "angle in deg") if "phi" in motion.columns else (1.0, "coordinate")
     _draw_lines(motion, ax, names, scale, label)
-    settled = np.max([m.settling for m in motion.measures])  # nan if one of them is nan
-    if settled < motion["t"][-1]:
-        ax.axvspan(settled, motion["t"][-1], color="0.93", zorder=0, label="settled within 2 %")
+    settling_time = np.max([m.settling for m in motion.measures])  # nan if one settling time is nan
+    if settling_time < motion["t"][-1]:
+        ax.axvspan(settling_time, motion["t"][-1], color="0.93", zorder=0, label="settled within 2 %")
 
 
 def _draw_torques(motion: Simulation, ax: Axes) -> None:
@@ -72,13 +76,13 @@ def _draw_path(motion: Simulation, ax: Axes) -> None:
         ax.plot(motion["x"], motion[f"y_{end}"], color=colour, label=f"{end} contact")
     ax.invert_yaxis()  # seen from above; the bicycle moves to the right of the picture
     unit = motion.units["x"]
-    ax.set(xlabel=f"way of the rear contact in {unit}", ylabel=f"to the right in {unit}")
+    ax.set(xlabel=f"distance of the rear contact in {unit}", ylabel=f"to the right in {unit}")
 
 
 def _draw_lines(motion: Simulation, ax: Axes, names: Sequence[str], scale: float, label: str) -> None:
     for k, name in enumerate(names):
         style, y = "-" if k < 6 else "--", scale * np.asarray(motion[name])
-        ax.plot(motion["t"], y, style, color=_COLOURS[k % 6], label=_LATEX.get(name, name))
+        ax.plot(motion["t"], y, style, color=_COLOURS[k % 6], label=_LABELS.get(name, name))
     ax.axhline(0, color="0.6", linewidth=0.6, zorder=0)
     unit = motion.units.get("t")
     ax.set(xlim=(0, motion["t"][-1]), xlabel=f"time in {unit}" if unit else "time", ylabel=label)

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from tmsopt.analysis import Diagnosis, Optimality
 from tmsopt.plots.labels import COMPLEX_H_LABELS, finish_axes
-from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, MARK, REAL, ensure_axes, note
+from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, MARK, REAL, ensure_axes, write_note
 from tmsopt.problem.solution import Solution
 from tmsopt.proofs import Proof
 
@@ -17,11 +17,11 @@ _STYLES = ("-", "--", "-.", ":")
 
 
 def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> Axes:
-    """Draw roots with their multiplicities; for an `Optimality`, only those on the rightmost line.
+    """Draw roots with their multiplicities; for an `Optimality`, only the rightmost roots.
 
     The Axes show the complex plane, in 1/s for a problem in SI. The half where motion grows is grey. For a complex H
-    the Axes show eigenfrequencies, and the upper half is grey. For a proof, the title says how narrow the proved
-    intervals are.
+    the Axes show eigenfrequencies, and the upper half is grey. For a proof, the title gives the width of the
+    proved intervals.
 
     Example:
         >>> axes = tmsopt.plots.draw_roots(tmsopt.solve("problems/ep4.toml"))
@@ -38,10 +38,10 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
     if isinstance(data, Solution):
         if (parameters := data.problem.posed.parameter_set).rate is not None:
             rate, unit = float(parameters.rate(data.parameters)), " in 1/s"
-        extreme = f"rightmost at {rate * data.abscissa:.5g}{unit[3:]}"
+        extreme_root = f"rightmost at {rate * data.abscissa:.5g}{unit[3:]}"
         if is_complex:
-            extreme = f"largest Im ω {max(w.im for w in data.eigenfrequencies):.5g}"
-        title = f"{data.problem.title}\n{data.structure}, {extreme}".strip()
+            extreme_root = f"largest Im ω {max(w.im for w in data.eigenfrequencies):.5g}"
+        title = f"{data.problem.title}\n{data.structure}, {extreme_root}".strip()
     elif isinstance(data, Proof):
         precision = f"each number within {data.radius:.1g}" if math.isfinite(data.radius) else data.method
         title = f"{data.claim}:\n" + (f"proved, {precision}" if data.proved else "not proved")
@@ -56,16 +56,16 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
         problem = getattr(data, "problem", None)
         _frame_frequencies(ax, positions, abs(problem.model.carrier or 1.0) if problem else 1.0)
     else:
-        positions = {(rate * re, rate * im * side): m for re, im, m in roots for side in (1, -1)}
+        positions = {(rate * re, rate * im * sign): m for re, im, m in roots for sign in (1, -1)}
         size = max((math.hypot(*z) for z in positions), default=1.0) * 1.3 or 1.0
         ax.axvspan(0, size, color="0.92", zorder=0)
         ax.axvline(0, color="grey", linewidth=0.6)
         ax.set(xlim=(-size, max([0.3 * size, *(1.2 * re for re, _ in positions)])), ylim=(-size, size))
         ax.set(xlabel=rf"$\mathrm{{Re}}\,s${unit}", ylabel=rf"$\mathrm{{Im}}\,s${unit}")
-    for place, m in positions.items():
-        ax.plot(*place, "o" if m == 1 else "s", color=REAL if m == 1 else MARK, markersize=5 + m)
+    for position, m in positions.items():
+        ax.plot(*position, "o" if m == 1 else "s", color=REAL if m == 1 else MARK, markersize=5 + m)
         if m > 1:
-            note(ax, f"{m}-fold", place, (7, 7), fontsize=9)
+            write_note(ax, f"{m}-fold", position, (7, 7), fontsize=9)
     return finish_axes(ax)
 
 
@@ -73,7 +73,7 @@ def _frame_frequencies(ax: Axes, positions: Iterable[tuple[float, float]], scale
     """Set limits around eigenfrequencies, and colour the half-plane above the real axis, where motion grows.
 
     Args:
-        scale: size of frequencies in the problem; sizes below 1e-12 of it are rounding errors.
+        scale: size of frequencies in the problem; smaller sizes than 1e-12 of this are rounding errors.
     """
     x, y = np.array([*positions]).T
     middle, low, high = np.mean(x), min(0.0, *y), max(0.0, *y)
@@ -88,7 +88,7 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
     """Draw how far a multiple root splits when one parameter changes.
 
     The Axes show the largest shift of a root over the change ε, both on logarithmic scales. The change is relative, or
-    absolute for a parameter that is 0. Each parameter has a line, which ends where its law ceases to hold; the legend
+    absolute for a parameter that is 0. Each parameter has a line, which ends where its law no longer holds; the legend
     shows the exponent of the law.
 
     Example:
@@ -99,15 +99,15 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
 
     More: docs/explanation/exceptional_points.md
     """
-    place, root_name = f"pair at {data.re:.5g} ± {data.im:.5g}i" if data.im else f"root at {data.re:.5g}", "root"
+    root_text, root_name = f"pair at {data.re:.5g} ± {data.im:.5g}i" if data.im else f"root at {data.re:.5g}", "root"
     if (omega := data.eigenfrequency) is not None:
         root_name = "eigenfrequency"
-        place = f"{root_name} {f'{omega:.5g}'.replace('j', 'i') if omega else 0}"
-    ax = ensure_axes(ax, 6.0, 4.4, f"{data.algebraic}-fold {place}, {data.kind}")
+        root_text = f"{root_name} {f'{omega:.5g}'.replace('j', 'i') if omega else 0}"
+    ax = ensure_axes(ax, 6.0, 4.4, f"{data.algebraic}-fold {root_text}, {data.kind}")
     for k, response in enumerate(data.responses):
         for law in response.laws[:1]:
-            reach = min(max(law.below, law.above, 1e-15), 1.0)
-            eps, power = np.array([1e-16, reach]), law.branches.exponent
+            max_change = min(max(law.below, law.above, 1e-15), 1.0)
+            eps, power = np.array([1e-16, max_change]), law.branches.exponent
             label, style = rf"{response.parameter}: $\varepsilon^{{{power}}}$", "o" + _STYLES[k % 4]
             shift = law.branches.size * eps ** float(power)
             ax.loglog(eps, shift, style, color=_COLOURS[k % 5], label=label, markevery=[1], markersize=4)

@@ -34,8 +34,8 @@ def draw_histogram(data: Results, ax: Axes | None = None) -> Axes:
     """
     title = "" if ax else data.study.title or data.study.problem.title
     ax = ensure_axes(ax, 6.4, 4.2)
-    share = (_draw_monte_carlo if data.study.method == "monte_carlo" else _draw_objective)(ax, data)
-    ax.set_title(f"{title}\n{share}".strip(), fontsize=10)
+    subtitle = (_draw_monte_carlo if data.study.method == "monte_carlo" else _draw_objective)(ax, data)
+    ax.set_title(f"{title}\n{subtitle}".strip(), fontsize=10)
     return finish_axes(ax)
 
 
@@ -49,22 +49,33 @@ def _draw_monte_carlo(ax: Axes, data: Results) -> str:
         nominal_value = -nominal_value * parameters.rate(nominal.parameters)
         axis_label = "decay rate in 1/s (negative: growth)"
     has_value, is_near = np.isfinite(values), _find_comparable(values)
-    stable = rows.column("stable").filled(False)
-    for chosen, colour, hatch, label in (stable, STABLE, "", "stable"), (~stable, MARK, "//", "not stable"):
-        if (chosen & is_near).any():
-            chosen_values, edges = values[chosen & is_near], _bin_edges(values[is_near])
-            ax.hist(chosen_values, edges, color=colour, edgecolor="white", hatch=hatch, linewidth=0.5, label=label)
+    is_stable = rows.column("stable").filled(False)
+    for mask, colour, hatch, label in (is_stable, STABLE, "", "stable"), (~is_stable, MARK, "//", "not stable"):
+        if (mask & is_near).any():
+            ax.hist(
+                values[mask & is_near],
+                _bin_edges(values[is_near]),
+                color=colour,
+                edgecolor="white",
+                hatch=hatch,
+                linewidth=0.5,
+                label=label,
+            )
     ax.axvline(nominal_value, color=LINE, linestyle="--", label=f"nominal design, {nominal_value:.4g}")
     ax.axvline(0, color=CAPSIZE, label="0: neither decay nor growth")
     ax.set(ylabel="designs", xlabel=axis_label)
     counts = (has_value & ~is_near, "far beyond the axis"), (~has_value, "without roots")
-    left_out = "".join(f", {np.count_nonzero(mask)} {reason}" for mask, reason in counts if mask.any())
-    share = f"{stable.sum()} of {len(stable)} stable ({100 * stable.mean():.3g} %)" if len(stable) else "no rows"
-    return share + left_out
+    omissions = "".join(f", {np.count_nonzero(mask)} {reason}" for mask, reason in counts if mask.any())
+    share = (
+        f"{is_stable.sum()} of {len(is_stable)} stable ({100 * is_stable.mean():.3g} %)"
+        if len(is_stable)
+        else "no rows"
+    )
+    return share + omissions
 
 
 def _find_comparable(values: Array) -> Truth:
-    """True for values that are not too far from the middle of the others to be shown with them."""
+    """True for values that are near the middle of all values, so that one axis can show them."""
     finite_values = values[np.isfinite(values)]
     low, high = np.percentile(finite_values, (25, 75)) if finite_values.size else (0.0, 0.0)
     is_near: Truth = np.abs(values - (low + high) / 2) <= _MAX_DISTANCE * (high - low) + 1e-9 * abs(high)
@@ -72,7 +83,7 @@ def _find_comparable(values: Array) -> Truth:
 
 
 def _bin_edges(values: Array) -> list[float]:
-    """Edges of bins. If values have both signs, 0 is an edge, so that no bin holds growth and decay."""
+    """Edges of bins. If values have both signs, 0 is an edge, so that no bin contains both growth and decay."""
     low, high = values.min(), values.max()
     width = (high - low) / _BINS or 1e-3 * (abs(high) or 1.0)
     return [width * k for k in range(math.floor(low / width), math.floor(high / width) + 2)]

@@ -17,17 +17,21 @@ from numpy.typing import ArrayLike
 
 from tmsopt.files import as_path, write_atomic
 
-STABLE, HEAVY, LINE, MARK, CRITICAL = "#56B4E9", "#E69F00", "#000000", "#D55E00", "#0072B2"
-"""Colours (Okabe–Ito palette) of stability, heavy damping, lines, marked points and the weave boundary."""
-
-REAL, COMPLEX, CAPSIZE = "#009E73", "#CC79A7", "#999999"
-"""Colours of real and of complex exceptional points, and of the capsize boundary."""
+# Colours of the Okabe–Ito palette, and grey.
+STABLE = "#56B4E9"  # stable designs
+HEAVY = "#E69F00"  # heavily damped designs
+LINE = "#000000"  # lines
+MARK = "#D55E00"  # marked points
+CRITICAL = "#0072B2"  # the weave boundary
+REAL = "#009E73"  # real exceptional points
+COMPLEX = "#CC79A7"  # complex exceptional points
+CAPSIZE = "#999999"  # the capsize boundary
 
 EDGE: dict[str, Any] = {"markeredgecolor": "black", "markeredgewidth": 0.6}
-"""Edge of filled markers."""
+"""Style of the edge of filled markers."""
 
 _ENTRY_WIDTH = 2.6  # width of a legend entry in inches
-_OWN_FIGURE = "own"  # label of Axes that have a figure for themselves; its legend is below them
+_OWN_FIGURE = "own"  # label of Axes that are alone in their figure; their legend is below them
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -61,44 +65,44 @@ def figure_of(ax: Axes) -> Figure:
 
 
 def draw_legend(ax: Axes, handles: Sequence[Artist]) -> None:
-    """Draw the legend of Axes: inside them, or below them if they have a figure for themselves."""
+    """Draw the legend of Axes: inside them, or below them if they are alone in their figure."""
     if ax.get_label() == _OWN_FIGURE:
         legend_below(figure_of(ax), handles)
     else:
-        _legend(ax, handles, fontsize=7, framealpha=0.9)
+        _draw_legend(ax, handles, fontsize=7, framealpha=0.9)
 
 
 def legend_below(figure: Figure, handles: Sequence[Artist], columns: int | None = None) -> None:
     """Draw one legend for the whole figure, below it, so that it covers nothing."""
     columns = columns or int(figure.get_figwidth() / _ENTRY_WIDTH)
-    _legend(figure, handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False)
+    _draw_legend(figure, handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False)
 
 
-def _legend(place: Axes | Figure, handles: Sequence[Artist], **look: Any) -> None:
+def _draw_legend(owner: Axes | Figure, handles: Sequence[Artist], **look: Any) -> None:
     """Draw a legend that has each label once."""
     if entries := {str(h.get_label()): h for h in handles}:
-        place.legend(handles=list(entries.values()), **look)
+        owner.legend(handles=list(entries.values()), **look)
 
 
 def draw_bands(ax: Axes, stable: ArrayLike, heavily_damped: ArrayLike) -> None:
     """Draw bands of stability and of heavy damping."""
-    for bands, colour, words in (stable, STABLE, "stable"), (heavily_damped, HEAVY, "heavily damped"):
+    for bands, colour, label in (stable, STABLE, "stable"), (heavily_damped, HEAVY, "heavily damped"):
         for low, high in np.reshape(bands, (-1, 2)):
-            ax.axvspan(low, high, color=colour, alpha=0.25, linewidth=0, label=words)
+            ax.axvspan(low, high, color=colour, alpha=0.25, linewidth=0, label=label)
 
 
-def entry(label: str, color: str, style: LineStyleType = "-", **look: Any) -> Artist:
+def legend_entry(label: str, color: str, style: LineStyleType = "-", **look: Any) -> Artist:
     """An entry of a legend: a line or a marker."""
     return Line2D([], [], color=color, linestyle=style, label=label, **look)
 
 
-def note(ax: Axes, text: str, place: Any, offset: tuple[float, float], **look: Any) -> None:
-    """Write a text beside a point; the offset is in points (1/72 inch)."""
+def write_note(ax: Axes, text: str, point: Any, offset: tuple[float, float], **look: Any) -> None:
+    """Write a text next to a point; the offset is in points (1/72 inch)."""
     look = {"fontsize": 8, "horizontalalignment": "right" if offset[0] < 0 else "left", **look}
-    ax.annotate(text, place, offset, textcoords="offset points", **look)
+    ax.annotate(text, point, offset, textcoords="offset points", **look)
 
 
-def arrow(ax: Axes, start: Any, end: Any, **look: Any) -> None:
+def draw_arrow(ax: Axes, start: Any, end: Any, **look: Any) -> None:
     """Draw an arrow between two points."""
     style = "-|>,head_width=0.25,head_length=0.5"
     ax.annotate("", end, start, arrowprops={"arrowstyle": style, "shrinkA": 0, "shrinkB": 0, **look})
@@ -131,8 +135,8 @@ def save(drawn_on: Figure | Axes, path: str | PathLike[str]) -> None:
 
 def render(figure: Figure, file_format: str) -> bytes:
     """The content of a file with the figure, in the format of that name, e.g. ``png``."""
-    sink = BytesIO()
+    stream = BytesIO()
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph", UserWarning)  # for letters without a glyph; the figure has boxes
-        figure.savefig(sink, dpi=200, format=file_format)
-    return sink.getvalue()
+        warnings.filterwarnings("ignore", "Glyph", UserWarning)  # a letter without a glyph becomes a box
+        figure.savefig(stream, dpi=200, format=file_format)
+    return stream.getvalue()

@@ -13,7 +13,7 @@ from tmsopt.plots.style import CAPSIZE, COMPLEX, CRITICAL, LINE, MARK, REAL, ens
 from tmsopt.tracing.branch import Branch, Trace, kinds_along
 
 _COLOURS = {"EP2": LINE, "weave": CRITICAL, "capsize": CAPSIZE, "resonance": COMPLEX}
-"""Colours of patterns other than roots of higher multiplicity; function `colour` has the rule for those."""
+"""Pattern → colour; `colour_of` has the rule for other patterns."""
 
 _UNNAMED_EVENTS = ("fold", "constraint", "end")
 _BAND_WIDTHS = 6.0, 2.5
@@ -57,7 +57,7 @@ def draw_branch(
 
     Args:
         tint: colour of all lines; by default it depends on the pattern.
-        model: its words are used for patterns.
+        model: the model whose names are used for patterns.
     """
     points = plane.to_axis(branch.parameters)
     states = zip(kinds_along(branch), branch.stable, branch.satisfied, strict=True)
@@ -70,7 +70,7 @@ def draw_branch(
         ax.plot(
             *points[:, first:end],
             "--" if kind.startswith("CEP") else "-" if satisfied else ":",
-            color=tint or colour(kind),
+            color=tint or colour_of(kind),
             linewidth=width if satisfied else width / 2,
             alpha=1.0 if stable else 0.35,
             label=", ".join(words),
@@ -78,7 +78,7 @@ def draw_branch(
         start = stop
 
 
-def colour(kind: str) -> str:
+def colour_of(kind: str) -> str:
     """Colour of a pattern: one for a single multiple root, one for several real roots, and one for complex pairs."""
     if kind in _COLOURS:
         return _COLOURS[kind]
@@ -99,12 +99,12 @@ def trace_figure(trace: Trace, horizontal: str | None = None, vertical: str | No
 
 
 def _draw_bands(ax: Axes, data: Trace, plane: PlaneAxes) -> None:
-    """Draw segments with colours for the mean abscissa of their ends, and the colour bar."""
-    pieces = []
+    """Draw the segments of all branches in the colour of the mean abscissa of their ends, and the colour bar."""
+    pieces = []  # of each branch: its segments, their mean abscissa, and whether they are stable
     for branch in data.branches:
         points, stable = plane.to_axis(branch.parameters).T, branch.stable
-        middle = (branch.abscissa[:-1] + branch.abscissa[1:]) / 2
-        pieces.append((np.stack([points[:-1], points[1:]], axis=1), middle, stable[:-1] & stable[1:]))
+        mean_abscissa = (branch.abscissa[:-1] + branch.abscissa[1:]) / 2
+        pieces.append((np.stack([points[:-1], points[1:]], axis=1), mean_abscissa, stable[:-1] & stable[1:]))
     if pieces:
         segments, values, is_stable = (np.concatenate(column) for column in zip(*pieces, strict=True))
         widths = np.where(is_stable, *_BAND_WIDTHS)

@@ -1,7 +1,7 @@
-"""Study: one problem solved for thousands of rows of varied values.
+"""A study: one problem, solved for thousands of rows of varied values.
 
-In: a study file, or a `Study`. Out: `Results`; the store of its rows survives a kill of the process. Read `study`
-first, then `run`; `store` saves the rows.
+In: a study file, or a `Study`. Out: `Results`. The store keeps the solved rows, even if the process is killed.
+Read `study` first, then `run`; `store` saves the rows.
 """
 
 import lazy_loader

@@ -7,6 +7,8 @@ from .sampling import (
     Span as Span, grid as grid, latin_hypercube as latin_hypercube, sobol as sobol, sobol_note as sobol_note,
 )
 from .solving import Solver as Solver, solve_row as solve_row, split_into_blocks as split_into_blocks
-from .store import Store as Store, check_same as check_same, open_store as open_store, view_store as view_store
+from .store import (
+    Store as Store, check_same_study as check_same_study, open_store as open_store, view_store as view_store,
+)
 from .study import Study as Study, definition as definition, over_grid as over_grid
 from .summary import Share as Share, summarise as summarise, compute_yield as compute_yield

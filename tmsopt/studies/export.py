@@ -12,7 +12,7 @@ from tmsopt.errors import Fault, InputError, import_optional, input_error
 from tmsopt.files import format_cell, format_header, netcdf_errors, write_atomic
 from tmsopt.progress import Listener, Steps, start_steps
 from tmsopt.records import frame
-from tmsopt.studies.rows import BLOCK, PREFIXES, RowTable
+from tmsopt.studies.rows import CHUNK_ROWS, PREFIXES, RowTable
 
 
 def export(
@@ -21,7 +21,7 @@ def export(
     metadata: Mapping[str, Any] | None = None,
     progress: Listener | None = None,
 ) -> None:
-    """Write rows to a file; its ending, one of `FORMATS`, determines the format. Doubles are exact.
+    """Write rows to a file; its ending, one of `FORMATS`, determines the format. Doubles are written exactly.
 
     A missing value is an empty cell in CSV (as is nan), null in Parquet and nan in netCDF. A netCDF file has the
     dimension ``row``. If the rows fill a grid, it also has the group ``grid``, whose dimensions are the varied values.
@@ -62,11 +62,11 @@ def check_export(path: Path) -> "Writer":
 
 
 def _split_columns(rows: RowTable, steps: Steps | None) -> Iterator[dict[str, Any]]:
-    """Columns of successive blocks of rows, one empty block if there are no rows; reports progress."""
-    for first in range(0, max(len(rows), 1), BLOCK):
-        yield {head: rows.column(head, slice(first, first + BLOCK)) for head in rows.headers}
+    """Yield header → column for each chunk of rows (an empty chunk if there are no rows), and report progress."""
+    for first in range(0, max(len(rows), 1), CHUNK_ROWS):
+        yield {head: rows.column(head, slice(first, first + CHUNK_ROWS)) for head in rows.headers}
         if steps:
-            steps(min(first + BLOCK, len(rows)), len(rows))
+            steps(min(first + CHUNK_ROWS, len(rows)), len(rows))
 
 
 def _write_csv(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps | None) -> None:
@@ -79,14 +79,14 @@ def _write_csv(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: S
 
 
 def _strip_header(header: str) -> str:
-    """A header without its prefix and its end: the name whose unit the column has."""
+    """A header without its prefix and its ending, such as ``.min``: the name whose unit the column has."""
     for table in ("varied", "reports", "violations"):
         header = header.removeprefix(PREFIXES[table])
     return re.sub(r"\.(min|max|limit)$", "", header)
 
 
 def _to_cell(value: Any) -> Any:
-    """A value as text of a cell; None, which is an empty cell, for nan."""
+    """The cell for a value: a text, or for nan None, which gives an empty cell."""
     if isinstance(value, bool):
         return str(value).lower()
     return None if value != value else format_cell(value)  # noqa: PLR0124
@@ -94,8 +94,8 @@ def _to_cell(value: Any) -> Any:
 
 def _write_parquet(rows: RowTable, path: Path, metadata: Mapping[str, Any], steps: Steps | None) -> None:
     pa, parquet = import_optional("pyarrow"), import_optional("pyarrow.parquet")
-    kinds = {head: rows.column(head, slice(0)).dtype for head in rows.headers}
-    types = {head: pa.string() if kind.hasobject else pa.from_numpy_dtype(kind) for head, kind in kinds.items()}
+    dtypes = {head: rows.column(head, slice(0)).dtype for head in rows.headers}
+    types = {head: pa.string() if dtype.hasobject else pa.from_numpy_dtype(dtype) for head, dtype in dtypes.items()}
     schema = pa.schema(types, {"tmsopt": json.dumps(metadata)})
     with parquet.ParquetWriter(path, schema) as writer:
         for columns in _split_columns(rows, steps):
@@ -114,7 +114,7 @@ def _write_netcdf(rows: RowTable, path: Path, metadata: Mapping[str, Any], _: St
 def build_grid_dataset(rows: RowTable) -> Any:
     """The rows as a dataset over the varied values; None if they do not fill a grid.
 
-    A name that has the same value in all rows is not an axis.
+    A varied name that has the same value in all rows is not an axis.
 
     Raises:
         InputError: if xarray is not installed.
@@ -129,7 +129,7 @@ def build_grid_dataset(rows: RowTable) -> Any:
 
 
 def _variable_names(rows: RowTable) -> dict[str, str]:
-    """Name of a variable in netCDF, which has no slash and is not ``row``, the dimension → header."""
+    """Name of a netCDF variable → header. The name has no slash, and is not ``row``, the name of the dimension."""
     return {head.replace("/", " over ").strip() + "_" * (head == "row"): head for head in rows.headers}
 
 
@@ -151,4 +151,4 @@ FORMATS: Mapping[str, tuple[Writer, tuple[str, ...]]] = {
     "parquet": (_write_parquet, ("pyarrow", "pyarrow.parquet")),
     "nc": (_write_netcdf, ("xarray", "netCDF4")),
 }
-"""Ending of a file → function that writes rows, and the modules it needs from the extra ``data``."""
+"""Ending of a file → (function that writes rows, modules that it needs; the extra ``data`` of tmsopt has them)."""

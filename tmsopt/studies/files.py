@@ -25,34 +25,37 @@ from tmsopt.program.options import STARTS
 from tmsopt.records import Column
 from tmsopt.studies.monte_carlo import DISTRIBUTIONS, Sampling
 from tmsopt.studies.sampling import (
-    MOST_ROWS,
+    MAX_ROWS,
     Span,
     check_size,
+    compute_max_rows,
     grid,
     latin_hypercube,
-    most_rows,
     sobol,
     sobol_note,
     span_faults,
 )
-from tmsopt.studies.study import METHODS, Study, common_faults, name_faults
+from tmsopt.studies.study import METHODS, Study, build_name_check, common_faults
 
-LARGEST = 1_000_000_000
+MAX_CSV_BYTES = 1_000_000_000
 """Largest number of bytes of a CSV file."""
 
-MOST_COLUMNS, LONGEST_LINE = 1000, 1_000_000
-"""Largest number of columns of a CSV file, and of characters in a line."""
+MAX_CSV_COLUMNS = 1000
+"""Largest number of columns of a CSV file."""
 
-_MAX_CELL_FAULTS = 20  # largest number of faults listed; a file in another format has a fault in each cell
-_NO_POINTS = "; a sample has rows, under [study]"
+MAX_CSV_LINE = 1_000_000
+"""Largest number of characters in a line of a CSV file."""
+
+_MAX_CELL_FAULTS = 20  # largest number of listed faults; a file in another format has a fault in every cell
+_SAMPLE_HINT = "; a sample has rows, a key under [study]"
 _RANGE = "{ min = 0.1, max = 1 }, with log = true for equal factors"
-_VARIED = {
+_VALUE_FORMS = {
     "grid": f"a list of values such as [0.1, 0.2], or {_RANGE.replace(' }', ', points = 10 }')}",
     "list": "a list with a value for every row, such as [0.1, 0.2]",
     "latin_hypercube": _RANGE,
     "sobol": _RANGE,
 }
-"""Method → accepted form of a varied value."""
+"""Method → the form in which a varied value is written."""
 
 
 def unit_of(problem: Posed, name: str) -> str:
@@ -67,21 +70,24 @@ def _prefix_keys(faults: Iterable[Fault], *section: str) -> list[Fault]:
 
 
 def _list_entries(table: Mapping[str, Any]) -> Iterator[tuple[str, Key, Any]]:
-    """Each varied name, its key in the file, and its value. In TOML, ``trail.limit = …`` without quotes is a table."""
+    """Yield each varied name, its key in the file, and its value.
+
+    If ``trail.limit = …`` has no quotes, TOML makes it a table ``trail`` with the key ``limit``.
+    """
     for name, spec in table.items():
-        if isinstance(spec, Mapping) and any(isinstance(inner, list | Mapping) for inner in spec.values()):
-            yield from ((f"{name}.{end}", ("vary", name, end), inner) for end, inner in spec.items())
+        if isinstance(spec, Mapping) and any(isinstance(value, list | Mapping) for value in spec.values()):
+            yield from ((f"{name}.{end}", ("vary", name, end), value) for end, value in spec.items())
         else:
             yield name, ("vary", name), spec
 
 
 def _read_vary(problem: Posed, content: "_StudyFile", faults: list[Fault]) -> dict[str, Any]:
     """Read the varied values: name → list of numbers, or `Span`; adds to `faults`."""
-    method, values, find_fault = content.study.method, {}, name_faults(problem)
+    method, values, check_name = content.study.method, {}, build_name_check(problem)
     if not content.vary:
-        faults.append(Fault(f"nothing varies; add a name under [vary], such as mu = {_VARIED[method]}", ("vary",)))
+        faults.append(Fault(f"nothing varies; add a name under [vary], such as mu = {_VALUE_FORMS[method]}", ("vary",)))
     for name, key, spec in _list_entries(content.vary):
-        if message := find_fault(name):
+        if message := check_name(name):
             faults.append(Fault(message, key))
         elif isinstance(spec, list) and spec and method in ("grid", "list"):
             unit = unit_of(problem, name)
@@ -89,15 +95,15 @@ def _read_vary(problem: Posed, content: "_StudyFile", faults: list[Fault]) -> di
         elif isinstance(spec, Mapping) and method != "list":
             values[name] = _read_range(name, unit_of(problem, name), key, spec, method, faults)
         else:
-            faults.append(Fault(f"found {short(spec)}; accepted: {_VARIED[method]}", key))
+            faults.append(Fault(f"found {short(spec)}; accepted: {_VALUE_FORMS[method]}", key))
     return values
 
 
 def _read_range(name: str, unit: str, key: Key, spec: Mapping[str, Any], method: str, faults: list[Fault]) -> Any:
     """Read the span of a range, and check its `points`; adds to `faults`."""
-    required, hint = (("min", "max", "points"), "") if method == "grid" else (("min", "max"), _NO_POINTS)
+    required, hint = (("min", "max", "points"), "") if method == "grid" else (("min", "max"), _SAMPLE_HINT)
     range_faults = [
-        Fault(f"missing {end} of {name}; accepted: {_VARIED[method]}", key) for end in required if end not in spec
+        Fault(f"missing {end} of {name}; accepted: {_VALUE_FORMS[method]}", key) for end in required if end not in spec
     ]
     accepted = (*required, "log")
     for end in (end for end in spec if end not in accepted):
@@ -106,7 +112,7 @@ def _read_range(name: str, unit: str, key: Key, spec: Mapping[str, Any], method:
     log = spec.get("log", False)
     if not isinstance(log, bool):
         range_faults.append(Fault(f"found {short(log)}; accepted: true or false", (*key, "log")))
-    range_faults += _prefix_keys(count_faults("points", spec.get("points", 2), 2, MOST_ROWS), *key)
+    range_faults += _prefix_keys(count_faults("points", spec.get("points", 2), 2, MAX_ROWS), *key)
     span = Span(low, high, log)
     faults += range_faults or [replace(f, key=key) for f in span_faults(name, span)]
     return span
@@ -156,7 +162,7 @@ def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] = lambda n
         InputError: listing every fault with file, line and column.
     """
     file, faults = str(path), list[Fault]()
-    with closing(read_lines(file, "CSV file of numbers", LARGEST, LONGEST_LINE)) as lines:
+    with closing(read_lines(file, "CSV file of numbers", MAX_CSV_BYTES, MAX_CSV_LINE)) as lines:
         reader = csv.reader(lines, strict=True, skipinitialspace=True)
 
         def fault(message: str, *key: str) -> Fault:
@@ -167,7 +173,7 @@ def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] = lambda n
             if first_faults := [fault(message) for message in _header_faults(names)]:
                 raise InputError(first_faults)
             columns, units = [array("d") for _ in names], [unit_of(name) for name in names]
-            max_rows = most_rows(len(names))
+            max_rows = compute_max_rows(len(names))
             for cells in filter(None, reader):
                 if len(cells) != len(names):
                     faults.append(fault(f"found {len(cells)} cells; accepted: {len(names)}, with decimal points"))
@@ -180,7 +186,7 @@ def read_csv(path: str | PathLike[str], unit_of: Callable[[str], str] = lambda n
                 if len(columns[0]) > max_rows:
                     raise InputError([fault(f"more than {max_rows} rows; accepted: up to {max_rows}")])
                 if len(faults) > _MAX_CELL_FAULTS:
-                    raise InputError([*faults[:_MAX_CELL_FAULTS], fault("and more after these")])
+                    raise InputError([*faults[:_MAX_CELL_FAULTS], fault("more faults follow")])
         except csv.Error as error:
             raise InputError([fault(f"not CSV: {error}")]) from None
     if not (faults or columns[0]):
@@ -194,12 +200,12 @@ def _header_faults(names: list[str]) -> Iterator[str]:
     header, example = ",".join(names), "accepted: varied names, separated by commas, such as: mu,lambda_s.max"
     for mark, word in ((";", "semicolons"), ("\t", "tabs")):
         if mark in header:
-            yield f"columns separated by {word}; separate them by commas, with decimal points in the numbers"
+            yield f"columns separated by {word}; separate them by commas, and write numbers with a decimal point"
             return
     if not header:
         yield f"the first line is empty; {example}"
-    elif len(names) > MOST_COLUMNS:
-        yield f"found {len(names)} columns; accepted: up to {MOST_COLUMNS}"
+    elif len(names) > MAX_CSV_COLUMNS:
+        yield f"found {len(names)} columns; accepted: up to {MAX_CSV_COLUMNS}"
     else:
         for number, name in enumerate(names, start=1):
             if not name:
@@ -237,10 +243,10 @@ _METHODS_OF_KEY: Mapping[Key, tuple[tuple[str, ...], str]] = {
     ("study", "rows"): (("latin_hypercube", "sobol", "monte_carlo"), "rows = 1024"),
     ("study", "csv"): (("csv",), 'csv = "rows.csv"'),
     ("study", "distribution"): (("monte_carlo",), ""),
-    ("vary",): (tuple(_VARIED), ""),
+    ("vary",): (tuple(_VALUE_FORMS), ""),
     ("tolerances",): (("monte_carlo",), ""),
 }
-"""Key → methods that accept it, and an example if they require it."""
+"""Key → (methods that accept it, an example if they require it)."""
 
 _ACCEPTED = {
     "title": "a text in quotes",
@@ -257,6 +263,7 @@ _ACCEPTED = {
     "warm": "true or false",
     "report": "a list of expressions, such as ['nu_H', '2*Fr_c']",
 }
+"""Key or section → accepted value."""
 
 
 class _Options(Section):
@@ -296,7 +303,7 @@ class _StudyFile(Section):
 
 
 FILE_SCHEMA: type[Section] = _StudyFile
-"""The model of a study file, for the JSON Schema that editors use."""
+"""The pydantic model of a study file, from which the JSON Schema for editors is made."""
 
 
 def load_study(path: str | PathLike[str]) -> Study | Sampling:
@@ -357,7 +364,7 @@ def load_study(path: str | PathLike[str]) -> Study | Sampling:
         values, faults = tables["tolerances"], faults + number_faults
     elif options.method == "csv" and options.csv:
         values = _read_rows(page, options.csv, posed, faults)
-    elif options.method in _VARIED:
+    elif options.method in _VALUE_FORMS:
         values = _read_vary(posed, content, faults)
     if faults:
         raise page.error(faults)
@@ -379,7 +386,7 @@ _FILE_KEYS: Mapping[str, Key] = {
     "rows": ("study", "rows"),
     "distribution": ("study", "distribution"),
 }
-"""Argument of a study or a sample → section or key of the file for it."""
+"""Argument of a `Study` or a `Sampling` → its section or key in the file."""
 
 
 def _read_problem(page: Page, title: str, faults: list[Fault]) -> Problem | None:
@@ -405,18 +412,18 @@ def _faults_of_named_file(name: str, error: InputError, key: Key) -> list[Fault]
 
 def _read_rows(page: Page, name: str, problem: Posed, faults: list[Fault]) -> dict[str, Column]:
     """Read the columns of a CSV file that a study names; adds to `faults`."""
-    file, find_fault = str(Path(page.file).parent / name), name_faults(problem)
+    file, check_name = str(Path(page.file).parent / name), build_name_check(problem)
     try:
         columns = read_csv(file, partial(unit_of, problem))
     except InputError as error:
         faults += _faults_of_named_file(name, error, ("study", "csv"))
         return {}
-    faults += [Fault(message, (column,)).at(file, 1) for column in columns if (message := find_fault(column))]
+    faults += [Fault(message, (column,)).at(file, 1) for column in columns if (message := check_name(column))]
     return columns
 
 
 def _method_faults(content: _StudyFile, fault_keys: Set[Key]) -> Iterator[Fault]:
-    """Faults of keys and sections that the method does not accept, or that it requires."""
+    """Faults of keys and sections that the method does not accept, or that it requires and that are missing."""
     method = content.study.method
     if method not in METHODS:
         yield Fault(f"unknown method {short(method)}; {suggest(method, METHODS)}", ("study", "method"))
@@ -434,7 +441,7 @@ def _method_faults(content: _StudyFile, fault_keys: Set[Key]) -> Iterator[Fault]
 
 
 def _shape_fault(location: tuple[int | str, ...], kind: str, value: Any) -> Fault:
-    """The fault for an error of pydantic, in the words of the study file."""
+    """Convert an error of pydantic to a fault with the keys of the study file."""
     key = tuple(str(k) for k in location if k not in ("str", "dict[str,any]", "float", "int"))
     name, in_options = key[:2][-1], key[0] == "study" and len(key) > 1
     if kind == "extra_forbidden" and key[0] in ("parameters", "objective", "constraints"):

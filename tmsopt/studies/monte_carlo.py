@@ -18,8 +18,8 @@ from tmsopt.program.options import STARTS
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Column, Table
 from tmsopt.search.solve import solve, solve_if_needed
-from tmsopt.studies.sampling import MOST_ROWS
-from tmsopt.studies.store import check_same, view_store
+from tmsopt.studies.sampling import MAX_ROWS
+from tmsopt.studies.store import check_same_study, view_store
 from tmsopt.studies.study import Study, common_faults
 
 DISTRIBUTIONS = ("uniform", "normal")
@@ -68,7 +68,7 @@ class Sampling:
         tolerances = self.tolerances or posed.tolerances
         faults = [*find_objective_faults(posed), *_tolerance_faults(posed, tolerances)]
         faults += [*common_faults(posed, self.seed, self.starts, self.report), *text_faults(self.title, "title")]
-        faults += count_faults("rows", self.rows, 1, MOST_ROWS)
+        faults += count_faults("rows", self.rows, 1, MAX_ROWS)
         if self.distribution not in DISTRIBUTIONS:
             message = f"found {short(self.distribution)}; {suggest(self.distribution, DISTRIBUTIONS)}"
             faults.append(Fault(message, ("distribution",)))
@@ -142,7 +142,7 @@ def _draw_around_optimum(request: Sampling, solution: Solution, progress: Listen
 
 
 def _draw_study(request: Sampling, design: Mapping[str, float]) -> Study:
-    """The study around a design, without its equalities and its pattern.
+    """The study of designs drawn around a nominal design, without equalities and without a pattern.
 
     Raises:
         InputError: if a tolerance exceeds the physical range of a parameter.
@@ -175,7 +175,7 @@ def _draw_study(request: Sampling, design: Mapping[str, float]) -> Study:
 def _check_store_matches(request: Sampling, store: Path) -> None:
     """Check, before the nominal design is solved, that the store belongs to this Monte Carlo study.
 
-    The comparison uses the nominal design that is saved in the store, so a change of that design is not noticed here.
+    This check uses the nominal design that is saved in the store. If that design has changed, this check passes.
 
     Raises:
         InputError: with the differences; also if the file is not a store, or damaged.
@@ -185,17 +185,17 @@ def _check_store_matches(request: Sampling, store: Path) -> None:
     try:
         design = {n: float(definition["problem"]["fixed"][n]) for n in request.problem.posed.parameter_set.names}
         study = _draw_study(request, {**design, **request.problem.fixed})
-    except (InputError, KeyError, TypeError, ValueError):  # the design is of another model, which is reported later
+    except (InputError, KeyError, TypeError, ValueError):  # the store is of another model; `open_store` reports this
         return
-    check_same(store, study)
+    check_same_study(store, study)
 
 
 def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:
     """Faults of the tolerances, an argument that is not checked yet and may have any type."""
     if not isinstance(tolerances, Mapping) or not tolerances:
-        text = f"found {short(tolerances)}" if tolerances else "no tolerances"
+        found = f"found {short(tolerances)}" if tolerances else "no tolerances"
         accepted = "parameters with their largest error, such as lambda_s = 0.01"
-        return [Fault(f"{text}; accepted: {accepted}", ("tolerances",))]
+        return [Fault(f"{found}; accepted: {accepted}", ("tolerances",))]
     names = problem.parameter_set.names
     faults, advice = [], limit_advice(suggest)
     for name, value in tolerances.items():
@@ -210,12 +210,12 @@ def _tolerance_faults(problem: Posed, tolerances: Any) -> list[Fault]:
     return faults
 
 
-def _draw_errors(parameters: int, rows: int, seed: int, distribution: str) -> NDArray[np.float64]:
-    """Errors relative to the tolerances, from −1 to 1, shape (parameters, rows)."""
-    uniform = np.random.default_rng(seed).random((rows, parameters)).T
+def _draw_errors(parameter_count: int, row_count: int, seed: int, distribution: str) -> NDArray[np.float64]:
+    """Errors relative to the tolerances, from −1 to 1, shape (parameter_count, row_count)."""
+    uniform = np.random.default_rng(seed).random((row_count, parameter_count)).T
     if distribution == "uniform":
         return np.asarray(2 * uniform - 1)
     from scipy.special import ndtr, ndtri
 
-    low = ndtr(-_DEVIATIONS_PER_TOLERANCE)
-    return np.clip(ndtri(low + uniform * (1 - 2 * low)) / _DEVIATIONS_PER_TOLERANCE, -1, 1)
+    tail = ndtr(-_DEVIATIONS_PER_TOLERANCE)  # probability of an error below −tolerance
+    return np.clip(ndtri(tail + uniform * (1 - 2 * tail)) / _DEVIATIONS_PER_TOLERANCE, -1, 1)

@@ -22,7 +22,7 @@ STATUSES = ("optimal", "infeasible", "not_converged", "failed", "quarantined")
 """Statuses of a row: the three of a solution, ``failed`` for an invalid problem or an error of the solver, and
 ``quarantined`` for a row that ended its worker process twice."""
 
-BLOCK = 10_000
+CHUNK_ROWS = 10_000
 """Number of rows that are read or written at once."""
 
 
@@ -35,13 +35,14 @@ class Row:
         seed: seed of its starts.
         varied: name → value in this row (rad, SI units).
         status: one of `STATUSES`.
-        cause: why the status is not ``optimal``, else empty.
+        cause: why the status is not ``optimal``, or what an optimal row violates when rounded to doubles; else empty.
         objective: value of the objective; nan if there is none.
-        abscissa, abscissa_realised: as in `Solution`; rows of older stores have only the first.
+        abscissa: largest real part of the roots, for the parameters before rounding.
+        abscissa_realised: the same for the parameters as stored in double precision; nan in rows of older stores.
         parameters: every parameter of the problem's parameter set.
         reports: values of the reported expressions.
         bound: no design within the limits has a better objective than this value; −inf if unknown.
-        method: how the bound was found, or ``none``.
+        method: how the bound was found; ``none`` without a bound.
         laws: label of a law of the paper → relative residual, where the law applies.
         violations: constraint → amount of violation in its unit (rad, SI); inf where the constraint has no value.
         starts: number of starts tried.
@@ -81,7 +82,7 @@ class Row:
 
     @property
     def stable(self) -> bool | None:
-        """Whether all roots lie left of the imaginary axis, in exact arithmetic and as stored; None without roots."""
+        """Whether all roots lie left of the imaginary axis, before and after rounding; None without roots."""
         return None if not math.isfinite(self.abscissa) else self.abscissa < 0 and not self.abscissa_realised >= 0
 
     @property
@@ -128,27 +129,31 @@ def _from_json(value: Any) -> Any:
 
 
 PREFIXES = {"varied": "varied.", "parameters": "", "reports": "report.", "laws": "law.", "violations": "violation."}
-"""Field of a row that is a table → prefix of the headers of its columns. Parameters have no prefix, unless a parameter
-has the name of a field: ``seed`` becomes ``parameter.seed``. So the header depends only on the name."""
+"""Field of a row that is a table → prefix of the headers of its columns. Parameters have no prefix, except a
+parameter that has the name of a field: ``seed`` becomes ``parameter.seed``. So a parameter has the same header in every
+study."""
 
-SAVED: Mapping[str, Any] = {f.name: f.type for f in _FIELDS if f.name not in (*PREFIXES, "seed")}
+SCALAR_FIELDS: Mapping[str, Any] = {f.name: f.type for f in _FIELDS if f.name not in (*PREFIXES, "seed")}
 """Field with a single value → type; the seed is left out, because it follows from the study."""
 
-_ORDER = [f.name for f in _FIELDS]
-_ORDER.insert(_ORDER.index("structure") + 1, "stable")
+_COLUMN_ORDER = [f.name for f in _FIELDS]
+_COLUMN_ORDER.insert(_COLUMN_ORDER.index("structure") + 1, "stable")
 
 Batch = dict[str, NDArray[Any]]
-"""Header → column of some rows. It has all fields of `SAVED`, and the numbers of the tables, nan where a row has none.
-Columns that follow from the study may be missing."""
+"""Header → column, for some rows of a study. A batch has all `SCALAR_FIELDS`, and the numbers in the tables of rows;
+a missing number is nan. Columns that follow from the study may be missing."""
 
 
 def header(table: str, key: str) -> str:
     """Header of the column for a key in a table of the rows."""
-    return f"parameter.{key}" if table == "parameters" and key in _ORDER else f"{PREFIXES[table]}{key}"
+    return f"parameter.{key}" if table == "parameters" and key in _COLUMN_ORDER else f"{PREFIXES[table]}{key}"
 
 
 def headers(study: Study) -> dict[str, tuple[str, str]]:
-    """Header of every column of a study → field of the row, and the key in it if the field is a table, else empty."""
+    """Header of every column of a study → (field of the row, key in that field).
+
+    The key is empty if the field is not a table.
+    """
     problem = study.problem.posed
     names = {
         "varied": tuple(study.columns),
@@ -158,7 +163,7 @@ def headers(study: Study) -> dict[str, tuple[str, str]]:
         "violations": (*problem.constraints, *problem.located[1:], "a0", "coefficients"),
     }
     sources: dict[str, tuple[str, str]] = {}
-    for name in _ORDER:
+    for name in _COLUMN_ORDER:
         sources |= {header(name, key): (name, key) for key in names[name]} if name in names else {name: (name, "")}
     return sources
 
@@ -175,7 +180,7 @@ def blank_batch(count: int) -> Batch:
 
 def batch_rows(rows: Sequence[Row]) -> Batch:
     """Rows as columns."""
-    batch = {name: column_of([getattr(row, name) for row in rows], kind) for name, kind in SAVED.items()}
+    batch = {name: column_of([getattr(row, name) for row in rows], kind) for name, kind in SCALAR_FIELDS.items()}
     for k, row in enumerate(rows):
         for table in ("parameters", "reports", "laws", "violations"):
             for key, value in getattr(row, table).items():
@@ -214,26 +219,26 @@ class RowTable(Sequence[Row]):
         self._columns = _merge([blank_batch(0), *batches])
         self.numbers: NDArray[np.int64] = self._columns["number"]
         status = self._columns["status"]
-        self._unsolved = (status == "failed") | (status == "quarantined")
+        self._is_unsolved = (status == "failed") | (status == "quarantined")
 
     def __len__(self) -> int:
         return len(self.numbers)
 
     @overload
-    def __getitem__(self, where: int) -> Row: ...
+    def __getitem__(self, index: int) -> Row: ...
 
     @overload
-    def __getitem__(self, where: slice) -> tuple[Row, ...]: ...
+    def __getitem__(self, index: slice) -> tuple[Row, ...]: ...
 
     def __getitem__(self, index: int | slice) -> Row | tuple[Row, ...]:
         if isinstance(index, slice):
             return tuple(self._rows(index))
-        place = range(len(self))[index]
-        return self._rows(slice(place, place + 1))[0]
+        first = range(len(self))[index]
+        return self._rows(slice(first, first + 1))[0]
 
     def __iter__(self) -> Iterator[Row]:
-        for first in range(0, len(self), BLOCK):
-            yield from self._rows(slice(first, first + BLOCK))
+        for first in range(0, len(self), CHUNK_ROWS):
+            yield from self._rows(slice(first, first + CHUNK_ROWS))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, RowTable | tuple) and list(self) == list(other)
@@ -244,8 +249,8 @@ class RowTable(Sequence[Row]):
     def __repr__(self) -> str:
         return f"RowTable({len(self)})"
 
-    def _rows(self, place: slice) -> list[Row]:
-        columns = [self.column(head, place).tolist() for head in self.headers]
+    def _rows(self, part: slice) -> list[Row]:
+        columns = [self.column(head, part).tolist() for head in self.headers]
         rows = []
         for values in zip(*columns, strict=True):
             row: dict[str, Any] = {name: {} for name in PREFIXES}
@@ -259,17 +264,17 @@ class RowTable(Sequence[Row]):
 
     @cached_property
     def _full_causes(self) -> NDArray[Any]:
-        """Why each row is not optimal; for rows evaluated without a solver, computed from their violations."""
-        texts, problem, unstable = self._columns["cause"], self.study.problem.posed, np.zeros(len(self), dtype=bool)
-        evaluated = (self._columns["status"] == "infeasible") & (texts == "")
+        """Why each row is not optimal. If a row was evaluated without a solver, its violations give the cause."""
+        texts, problem, is_unstable = self._columns["cause"], self.study.problem.posed, np.zeros(len(self), dtype=bool)
+        lacks_cause = (self._columns["status"] == "infeasible") & (texts == "")
         for name, condition in problem.conditions.items():
             unit, amounts = unit_of(problem, name), self.column(header("violations", name))
-            violated = np.flatnonzero(evaluated & ~amounts.mask)
-            for k, amount in zip(violated.tolist(), amounts[violated].tolist(), strict=True):
+            indices = np.flatnonzero(lacks_cause & ~amounts.mask)
+            for k, amount in zip(indices.tolist(), amounts[indices].tolist(), strict=True):
                 texts[k] += f"{', ' if texts[k] else 'violated: '}{name} by {unit.show(amount, 3)}"
             if "abscissa" in condition.names:
-                unstable[violated] = self._columns["abscissa"][violated] >= 0
-        texts[unstable] += f"; {UNSTABLE}"
+                is_unstable[indices] = self._columns["abscissa"][indices] >= 0
+        texts[is_unstable] += f"; {UNSTABLE}"
         return texts
 
     def values(self, head: str) -> NDArray[Any]:
@@ -277,23 +282,23 @@ class RowTable(Sequence[Row]):
         column = self.column(head)
         return np.where(column.mask, np.nan, column.data) if column.mask.any() else column.data
 
-    def column(self, head: str, place: slice = slice(None)) -> Any:
+    def column(self, head: str, part: slice = slice(None)) -> Any:
         """One column, or a slice of it, as a masked array; a row without a value is masked."""
-        (name, key), numbers, study = self.headers[head], self.numbers[place], self.study
-        values = self._columns[head][place] if head in self._columns else np.full(len(numbers), np.nan)
-        absent: Any = False
+        (name, key), numbers, study = self.headers[head], self.numbers[part], self.study
+        values = self._columns[head][part] if head in self._columns else np.full(len(numbers), np.nan)
+        is_absent: Any = False
         match name:
             case "seed":
                 values = column_of([study.seed_of(number) for number in numbers.tolist()], int)
             case "cause":
-                values = self._full_causes[place]
+                values = self._full_causes[part]
             case "stable":
-                ideal, realised = self._columns["abscissa"][place], self._columns["abscissa_realised"][place]
-                values, absent = (ideal < 0) & ~(realised >= 0), ~np.isfinite(ideal)
+                abscissa, rounded_abscissa = (self._columns[name][part] for name in ("abscissa", "abscissa_realised"))
+                values, is_absent = (abscissa < 0) & ~(rounded_abscissa >= 0), ~np.isfinite(abscissa)
             case "varied" | "parameters":
                 column = study.columns.get(key)
                 study_values = study.problem.fixed.get(key, np.nan) if column is None else np.asarray(column)[numbers]
                 values = np.where(np.isnan(values), study_values, values)
             case "laws" | "violations":
-                absent = np.isnan(values)
-        return np.ma.array(values, mask=self._unsolved[place] if name in ("parameters", "reports") else absent)
+                is_absent = np.isnan(values)
+        return np.ma.array(values, mask=self._is_unsolved[part] if name in ("parameters", "reports") else is_absent)

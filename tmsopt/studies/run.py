@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 _COMMIT_SECONDS = 1.0
-"""Seconds between transactions; a kill loses at most the work of this time. A transaction takes about 1/30 of it."""
+"""Seconds between transactions. A kill loses at most the rows of this time; a transaction takes about 1/30 of it."""
 
 _MAX_ROWS_WITHOUT_WORKERS = 32  # up to this number of rows, starting workers would take longer than solving the rows
 
@@ -43,11 +43,10 @@ class Results(Printable):
     Attributes:
         rows: all rows; if the study was stopped, the rows solved until then.
         solved: number of rows solved by this call; the others were in the store.
-        seconds: time that the solved rows took.
+        seconds: time taken by the rows that this call solved.
         engine: ``in process``, ``2 processes`` or the address of a cluster; empty if no row was solved.
         found: number of rows that were in the store.
-        about: metadata for exports: the definition of the study; the time, the machine and the versions with which the
-            store was made.
+        about: metadata for exports: the definition of the study, and the time, machine and versions of its store.
 
     Example:
         >>> study = tmsopt.over_grid("problems/ep4.toml", {"zeta_B": [-0.45, -0.8]})
@@ -171,12 +170,12 @@ def run_study(
     path = None if store is None else as_path(store, "an SQLite file")
     full_study = prepare_study(request, progress, None if fresh else path)
     if path is None:
-        return _complete(full_study, None, workers, scheduler, note, progress)
+        return _complete_rows(full_study, None, workers, scheduler, note, progress)
     start_steps(progress, "waiting for the store")
     with open_store(path, full_study, fresh=fresh) as opened_store:
         for line in opened_store.warnings:
             note(line)
-        return _complete(full_study, opened_store, workers, scheduler, note, progress)
+        return _complete_rows(full_study, opened_store, workers, scheduler, note, progress)
 
 
 def read_results(study: Study, store: str | PathLike[str]) -> Results:
@@ -204,7 +203,7 @@ def _read_batches(study: Study, store: Store) -> list[Batch]:
     return batches
 
 
-def _complete(
+def _complete_rows(
     study: Study,
     store: Store | None,
     workers: int | None,
@@ -213,38 +212,38 @@ def _complete(
     progress: Listener | None,
 ) -> Results:
     """Read the rows of the store, if there is one; solve the missing rows and store them."""
-    batches, missing, engine = list[Batch](), np.ones(len(study), dtype=bool), ""
+    batches, is_missing, engine = list[Batch](), np.ones(len(study), dtype=bool), ""
     if store is not None:
         start_steps(progress, "reading the store")
         batches = _read_batches(study, store)  # a damaged store is reported before any work
         for batch in batches:
-            missing[batch["number"]] = False
-    stored_count = count = len(study) - int(missing.sum())
+            is_missing[batch["number"]] = False
+    stored_count = done_count = len(study) - int(is_missing.sum())
     if stored_count and store is not None:
         note(f"{stored_count} of {len(study)} rows are in {store.path}")
     start_time, steps = time.perf_counter(), start_steps(progress, "solving rows", "row")
 
     def report_rows(increment: int) -> None:
-        nonlocal count
-        count += increment
+        nonlocal done_count
+        done_count += increment
         if steps:
-            steps(count, len(study))
+            steps(done_count, len(study))
 
     def save_batch(batch: Batch) -> None:
         if store is not None:
             store.add(batch)
         batches.append(batch)
-        missing[batch["number"]] = False
+        is_missing[batch["number"]] = False
 
     if stored_count < len(study):
         report_rows(0)
         if can_evaluate(study):
             engine = "in process"
-            for batch in evaluate_rows(study, np.flatnonzero(missing)):
+            for batch in evaluate_rows(study, np.flatnonzero(is_missing)):
                 save_batch(batch)
                 report_rows(len(batch["number"]))
-    if missing.any():
-        remaining, new_rows, last_commit = set(np.flatnonzero(missing).tolist()), list[Row](), time.perf_counter()
+    if is_missing.any():
+        remaining, new_rows, last_commit = set(np.flatnonzero(is_missing).tolist()), list[Row](), time.perf_counter()
         executor = _choose_executor(len(remaining), workers, scheduler, note)
         engine = executor.name
         try:
@@ -259,35 +258,35 @@ def _complete(
             save_batch(batch_rows(new_rows))  # also after an interruption
     seconds = time.perf_counter() - start_time if engine else 0.0
     about = {} if store is None else store.about()
-    return Results(study, RowTable(study, batches), count - stored_count, seconds, engine, stored_count, about)
+    return Results(study, RowTable(study, batches), done_count - stored_count, seconds, engine, stored_count, about)
 
 
-def _choose_executor(count: int, workers: int | None, scheduler: str | None, note: Note) -> Executor:
+def _choose_executor(row_count: int, workers: int | None, scheduler: str | None, note: Note) -> Executor:
     """The executor for a number of rows."""
     if scheduler is not None:
         return cluster(scheduler, note)
-    workers = workers or (1 if count <= _MAX_ROWS_WITHOUT_WORKERS else cores())
+    workers = workers or (1 if row_count <= _MAX_ROWS_WITHOUT_WORKERS else cores())
     return in_process() if workers == 1 else processes(workers, note)
 
 
 def _solve_rows(study: Study, remaining: set[int], executor: Executor, note: Note) -> Generator[Row]:
     """Yield rows when they are solved.
 
-    If a block ends its worker process, its rows are solved one by one; a row that ends its worker is quarantined.
+    If a block crashes its worker process, its rows are solved one by one; a row that crashes its worker is quarantined.
     """
     blocks = split_into_blocks(study) if study.warm else [(number,) for number in sorted(remaining)]
-    solver, units = Solver(study), [block for block in blocks if not remaining.isdisjoint(block)]
-    while units:
+    solver, tasks = Solver(study), [block for block in blocks if not remaining.isdisjoint(block)]
+    while tasks:
         single_rows: list[tuple[int, ...]] = []
-        with closing(executor.map(solver, units)) as answers:
-            for place, answer in answers:
-                unit = units[place]
+        with closing(executor.map(solver, tasks)) as answers:
+            for index, answer in answers:
+                task = tasks[index]
                 if not isinstance(answer, Crash):
                     yield from (row for row in answer if row.number in remaining)  # part of a block may be in the store
-                elif len(unit) > 1:
-                    single_rows += [(number,) for number in unit if number in remaining]
+                elif len(task) > 1:
+                    single_rows += [(number,) for number in task if number in remaining]
                 else:
-                    note(f"row {unit[0]} is quarantined")
+                    note(f"row {task[0]} is quarantined")
                     cause = f"ended its worker twice{f' ({answer.cause})' if answer.cause else ''}"
-                    yield solver.row(unit[0], status="quarantined", cause=cause)
-        units = single_rows
+                    yield solver.row(task[0], status="quarantined", cause=cause)
+        tasks = single_rows

@@ -11,10 +11,10 @@ import numpy as np
 from tmsopt.errors import Fault, InputError, count_faults, input_error, is_number, short, table_faults
 from tmsopt.records import Array, Column
 
-MOST_ROWS = 10_000_000
+MAX_ROWS = 10_000_000
 """Largest number of rows of a study."""
 
-MOST_NUMBERS = 40_000_000
+MAX_NUMBERS = 40_000_000
 """Largest number of values in all columns together; they are held in memory."""
 
 _EXACT_DIGITS = 15  # decimal digits that every double holds
@@ -22,7 +22,7 @@ _EXACT_DIGITS = 15  # decimal digits that every double holds
 
 @dataclass(frozen=True)
 class Span:
-    """A range from `low` to `high`. With `log` it is logarithmic, and both ends must have the same sign.
+    """A range from `low` to `high`. With `log` the range is logarithmic, and both ends must have the same sign.
 
     Example:
         >>> [round(x, 9) for x in tmsopt.Span(1, 100, log=True).points(3)]
@@ -55,15 +55,15 @@ def grid(axes: Mapping[str, Sequence[float]]) -> dict[str, Column]:
     Raises:
         InputError: for too many rows, or an axis that is not a list of numbers.
     """
-    lists = list[Array]()
+    arrays = list[Array]()
     for name, values in axes.items():
         numbers = column_of_numbers(values)
         if numbers is None or not numbers.size:
             message = f"found {short(values)}; accepted: a list of numbers, such as [0.1, 0.2]"
             raise input_error(message, name)
-        lists.append(numbers)
-    check_size([len(numbers) for numbers in lists])
-    combinations = np.meshgrid(*lists, indexing="ij")
+        arrays.append(numbers)
+    check_size([len(numbers) for numbers in arrays])
+    combinations = np.meshgrid(*arrays, indexing="ij")
     return {name: Column(column.ravel()) for name, column in zip(axes, combinations, strict=True)}
 
 
@@ -110,12 +110,12 @@ def sobol_note(rows: int) -> str:
     if rows & (rows - 1) == 0:
         return ""
     power = 2 ** round(math.log2(rows))
-    return f"a Sobol sample is evenly balanced for a power of 2; {rows} rows are not, {power} would be"
+    return f"a Sobol sample is evenly balanced if the number of rows is a power of 2; {rows} is not, {power} is"
 
 
-def most_rows(columns: int) -> int:
+def compute_max_rows(column_count: int) -> int:
     """Largest number of rows of a study with this number of columns."""
-    return min(MOST_ROWS, MOST_NUMBERS // max(1, columns))
+    return min(MAX_ROWS, MAX_NUMBERS // max(1, column_count))
 
 
 def check_size(sizes: Sequence[int]) -> None:
@@ -124,7 +124,7 @@ def check_size(sizes: Sequence[int]) -> None:
     Raises:
         InputError: if the grid has too many rows.
     """
-    if math.prod(sizes) > (max_rows := most_rows(len(sizes))):
+    if math.prod(sizes) > (max_rows := compute_max_rows(len(sizes))):
         text = f"{' x '.join(map(str, sizes))} = {math.prod(sizes)} rows"
         raise input_error(f"found {text}; accepted: up to {max_rows}; take fewer points", "columns")
 
@@ -139,9 +139,12 @@ def span_faults(name: str, span: Span) -> Iterator[Fault]:
     if low > high:
         yield Fault(f"min = {low:.6g} is greater than max = {high:.6g}; swap them", key)
     elif span.log and not (low > 0 or high < 0):
-        yield Fault(f"log from {low:.6g} to {high:.6g}; accepted: both ends positive, or both negative", key)
+        yield Fault(
+            f"log = true from {low:.6g} to {high:.6g}; accepted: both ends positive, or both negative",
+            key,
+        )
     elif not math.isfinite(max(high / low, low / high) if span.log else high - low):
-        yield Fault(f"from {low:.6g} to {high:.6g} is wider than a double can hold; narrow it", key)
+        yield Fault(f"the range from {low:.6g} to {high:.6g} is wider than a double can hold; make it narrower", key)
 
 
 def column_of_numbers(values: Any) -> Array | None:
@@ -163,22 +166,22 @@ def _read_spans(ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Sp
             spans[name] = limits if isinstance(limits, Span) else Span(*limits)
             faults += span_faults(name, spans[name])
         except TypeError:
-            accepted = "(least, greatest), or a tmsopt.Span"
+            accepted = "(minimum, maximum), or a tmsopt.Span"
             faults.append(Fault(f"found {short(limits)}; accepted: {accepted}", ("ranges", name)))
     if not ranges:
         faults.append(Fault("nothing varies; give a range", ("ranges",)))
-    faults += [*count_faults("rows", rows, 1, most_rows(len(ranges))), *count_faults("seed", seed, 0)]
+    faults += [*count_faults("rows", rows, 1, compute_max_rows(len(ranges))), *count_faults("seed", seed, 0)]
     if faults:
         raise InputError(faults)
     return spans
 
 
-def _draw_sample(name: str, ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Column]:
-    """Columns from a sampler of SciPy; version 1.15 renamed its argument for random numbers."""
+def _draw_sample(sampler_name: str, ranges: Mapping[str, Any], rows: int, seed: int) -> dict[str, Column]:
+    """Columns from a sampler of SciPy, whose argument for random numbers has another name since version 1.15."""
     from scipy.stats import qmc
 
-    spans, sampler = _read_spans(ranges, rows, seed), getattr(qmc, name)
+    spans, sampler = _read_spans(ranges, rows, seed), getattr(qmc, sampler_name)
     argument = "rng" if "rng" in inspect.signature(sampler).parameters else "seed"
-    size = 2 ** math.ceil(math.log2(rows)) if name == "Sobol" else rows
+    size = 2 ** math.ceil(math.log2(rows)) if sampler_name == "Sobol" else rows
     shares = sampler(len(spans), **{argument: np.random.default_rng(seed)}).random(size)[:rows].T
     return {name: Column(span.at(share)) for (name, span), share in zip(spans.items(), shares, strict=True)}

@@ -1,6 +1,6 @@
-"""Solve the rows of a study: one by one, or from the optimum of a neighbour (warm), or all together if nothing is free.
+"""Solves the rows of a study: each alone, or from the optimum of a neighbour (warm), or all at once if nothing is free.
 
-A row that is not started from a neighbour's optimum is solved cold.
+A row is solved cold if it is not started from a neighbour's optimum.
 """
 
 import math
@@ -27,11 +27,12 @@ from tmsopt.search.state import same_objective
 from tmsopt.studies.rows import PREFIXES, Batch, Row, blank_batch, column_of, header
 from tmsopt.studies.study import Study
 
-ROWS_OF_BLOCK = 32
-"""Number of rows of a block; the first row of each block is solved cold, so that blocks are independent."""
+BLOCK_ROWS = 32
+"""Number of rows of a block of neighbours; its first row is solved cold, so that blocks are independent."""
 
 _EXTRA_STARTS = 1
-"""Further starts of a warm row, next to the optimum of its neighbour; they find optima that no end of a block has."""
+"""Number of starts of a warm row besides the optimum of its neighbour; they find optima that neither the first nor
+the last row of a block has."""
 
 
 @dataclass(frozen=True)
@@ -49,25 +50,25 @@ def solve_row(study: Study, number: int) -> SolvedRow:
         InputError: for a row number outside the study.
     """
     study.varied(number)
-    unit = next((block for block in split_into_blocks(study) if number in block), ()) if study.warm else (number,)
-    return next(answer for answer in Solver(study).answers(unit) if answer.row.number == number)
+    task = next((block for block in split_into_blocks(study) if number in block), ()) if study.warm else (number,)
+    return next(solved for solved in Solver(study).solve_rows(task) if solved.row.number == number)
 
 
 @dataclass(frozen=True)
 class Solver:
-    """Solves units of one study.
+    """Solves tasks of one study.
 
-    A unit is one row, or with warm starts a block of neighbours. If a unit is one row of a block, it is solved cold.
+    A task is one row, or with warm starts a block of neighbours. If a task is one row of a block, it is solved cold.
     """
 
     study: Study
 
     def __call__(self, numbers: Sequence[int]) -> list[Row]:
-        """The rows of a unit."""
-        return [answer.row for answer in self.answers(numbers)]
+        """Solve a task, given by its row numbers, and return its rows."""
+        return [solved.row for solved in self.solve_rows(numbers)]
 
-    def answers(self, numbers: Sequence[int]) -> list[SolvedRow]:
-        """The rows of a unit, each with its solution."""
+    def solve_rows(self, numbers: Sequence[int]) -> list[SolvedRow]:
+        """Solve a task, and return its rows with their solutions."""
         with _thread_pools().limit(limits=1):
             if self.study.warm and len(numbers) > 1:
                 return self._solve_block(numbers)
@@ -77,21 +78,21 @@ class Solver:
         """Solve both ends of a block cold, and each other row from its neighbour and from `_EXTRA_STARTS` starts.
 
         Another optimum may become better along the block. If the last row or one of these starts finds it, the rows
-        before it are solved from it too, as long as it is better.
+        before it are also solved from that optimum, as long as it is better.
         """
-        answers = [self._solve_row(numbers[0])]
+        solved_rows = [self._solve_row(numbers[0])]
         for number in numbers[1:]:
-            answers.append(self._solve_row(number, answers[-1].row, _EXTRA_STARTS))
-        end = self._solve_row(numbers[-1]) if answers[-1].row.warm else answers[-1]
-        may_differ = [_may_differ(answer) for answer in answers]
-        if self._is_better(end.row, answers[-1].row):
-            answers[-1], may_differ[-1] = end, True
+            solved_rows.append(self._solve_row(number, solved_rows[-1].row, _EXTRA_STARTS))
+        cold_end = self._solve_row(numbers[-1]) if solved_rows[-1].row.warm else solved_rows[-1]
+        may_differ = [_may_differ(row) for row in solved_rows]
+        if self._is_better(cold_end.row, solved_rows[-1].row):
+            solved_rows[-1], may_differ[-1] = cold_end, True
         for k in range(len(numbers) - 2, -1, -1):
-            if may_differ[k + 1] and answers[k + 1].row.status == "optimal":
-                candidate = self._solve_row(numbers[k], answers[k + 1].row)
-                if self._is_better(candidate.row, answers[k].row):
-                    answers[k], may_differ[k] = candidate, True
-        return answers
+            if may_differ[k + 1] and solved_rows[k + 1].row.status == "optimal":
+                candidate = self._solve_row(numbers[k], solved_rows[k + 1].row)
+                if self._is_better(candidate.row, solved_rows[k].row):
+                    solved_rows[k], may_differ[k] = candidate, True
+        return solved_rows
 
     def _is_better(self, row: Row, current: Row) -> bool:
         """Whether a solution of a row is better than the current one by more than rounding."""
@@ -111,13 +112,13 @@ class Solver:
             if neighbour is not None and neighbour.status == "optimal":
                 near = {name: neighbour.parameters[name] for name in problem.free}
                 solution = solve(problem, starts=1 + extra_starts, near=near, **options)
-            warm = solution is not None and solution.status == "optimal"
-            if solution is None or not warm:
+            is_warm = solution is not None and solution.status == "optimal"
+            if solution is None or not is_warm:
                 solution = solve(problem, starts=self.study.starts, **options)
-            values = _extract_fields(solution, self.study.report) | {"warm": warm}
+            values = _extract_fields(solution, self.study.report) | {"warm": is_warm}
         except InputError as error:
             values = {"status": "failed", "cause": "; ".join(str(fault) for fault in error.faults)}
-        except Exception as error:  # a row that breaks the program must not end a study
+        except Exception as error:  # an error in one row must not end the study
             values = {"status": "failed", "cause": f"{type(error).__name__}: {error}"}
         return SolvedRow(self.row(number, seconds=time.perf_counter() - start_time, **values), solution)
 
@@ -158,14 +159,14 @@ def _thread_pools() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _may_differ(answer: SolvedRow) -> bool:
+def _may_differ(solved_row: SolvedRow) -> bool:
     """Whether a row may have another optimum than the neighbour from which it was started."""
-    starts = answer.solution.starts if answer.solution is not None else None
-    return starts is not None and (not answer.row.warm or starts.at_best < starts.tried)
+    starts = solved_row.solution.starts if solved_row.solution is not None else None
+    return starts is not None and (not solved_row.row.warm or starts.at_best < starts.tried)
 
 
 def _describe_cause(solution: Solution) -> str:
-    """Why a solution is not optimal, or which constraints its stored doubles violate."""
+    """Why a solution is not optimal, or which constraints it violates after rounding to doubles."""
     if solution.status == "optimal":
         amounts = amounts_text(solution.problem.posed, solution.missed)
         return f"rounded to doubles, violates {amounts}" if amounts else ""
@@ -200,8 +201,8 @@ def evaluate_rows(study: Study, numbers: NDArray[np.int64]) -> Iterator[Batch]:
     """
     varied = {name: np.asarray(column) for name, column in study.columns.items()}
     for first in range(0, len(numbers), DESIGNS_PER_BLOCK):
-        start_time, chunk = time.perf_counter(), numbers[first : first + DESIGNS_PER_BLOCK]
-        columns = {name: column[chunk] for name, column in varied.items()}
+        start_time, chunk_numbers = time.perf_counter(), numbers[first : first + DESIGNS_PER_BLOCK]
+        columns = {name: column[chunk_numbers] for name, column in varied.items()}
         results = evaluate_columns(study.problem.posed, columns, study.report)
         if results is None:
             return
@@ -210,21 +211,21 @@ def evaluate_rows(study: Study, numbers: NDArray[np.int64]) -> Iterator[Batch]:
             table |= {header(name, n): x for n, x in value.items()} if isinstance(value, Mapping) else {name: value}
         is_certain = table.pop("is_certain")
         if is_certain.any():
-            seconds = (time.perf_counter() - start_time) / len(chunk)
+            seconds = (time.perf_counter() - start_time) / len(chunk_numbers)
             certain_table = {name: values[is_certain] for name, values in table.items()}
-            yield build_evaluated_batch(chunk[is_certain], certain_table, seconds, platform.node())
+            yield build_evaluated_batch(chunk_numbers[is_certain], certain_table, seconds, platform.node())
 
 
 def build_evaluated_batch(numbers: NDArray[np.int64], table: dict[str, Array], seconds: float, host: str) -> Batch:
-    """All columns of rows that were evaluated together.
+    """Make the batch of rows that were evaluated together.
 
     Args:
-        table: header → numbers; also ``oscillates`` and ``by_relation``, which determine structure and method.
+        table: header → numbers; ``oscillates`` gives the structure, and ``by_relation`` the method.
     """
     violations = [values for name, values in table.items() if name.startswith(PREFIXES["violations"])]
-    infeasible = np.any(~np.isnan([np.full(len(numbers), np.nan), *violations]), axis=0)
-    texts = {
-        "status": (("optimal", "infeasible"), infeasible),
+    is_infeasible = np.any(~np.isnan([np.full(len(numbers), np.nan), *violations]), axis=0)
+    texts = {  # header → (possible texts, index of the text in each row)
+        "status": (("optimal", "infeasible"), is_infeasible),
         "structure": (("real", "pair"), table.pop("oscillates")),
         "method": (("none", "omega0", "relation"), np.isfinite(table["bound"]) * (1 + table.pop("by_relation"))),
         "host": ((host,), 0 * numbers),
@@ -234,7 +235,7 @@ def build_evaluated_batch(numbers: NDArray[np.int64], table: dict[str, Array], s
     return batch | {name: column_of(options, str)[indices.astype(int)] for name, (options, indices) in texts.items()}
 
 
-def split_into_blocks(study: Study, size: int = ROWS_OF_BLOCK) -> list[tuple[int, ...]]:
+def split_into_blocks(study: Study, size: int = BLOCK_ROWS) -> list[tuple[int, ...]]:
     """Split all rows into blocks of `size`, in which consecutive rows have similar values.
 
     A grid is traversed back and forth, so that consecutive rows differ in one axis by one step. For other studies, each
@@ -243,7 +244,7 @@ def split_into_blocks(study: Study, size: int = ROWS_OF_BLOCK) -> list[tuple[int
     """
     count = len(study)
     ranks = [np.unique(np.asarray(column), return_inverse=True)[1] for column in study.columns.values()]
-    axes = [rank for rank in ranks if rank.max() > 0]
+    axes = [rank for rank in ranks if rank.max() > 0]  # ranks of the values in the columns that vary
     if study.grid_shape is None:
         axes = axes[: max(1, int(math.log2(count)))]
         bins = round(count ** (1 / max(1, len(axes))))

@@ -1,8 +1,9 @@
 """The store of a study: one SQLite file with one writer and any number of readers.
 
-A row is a line of the table ``rows``: its fields, and its other numbers as little-endian doubles, whose order is in the
-table ``numbers``. Added rows survive ``kill -9`` of the writer. A store of an earlier version is converted when it is
-opened for writing; when it is only read, the conversion is in memory.
+A row of the study is a line of the table ``rows``. The line has the fields with one value; all other numbers follow as
+little-endian doubles, whose headers are in the table ``numbers``. Added rows survive ``kill -9`` of the writer. A
+store of an earlier version is converted when it is opened for writing; when it is only read, it is converted in
+memory.
 """
 
 import json
@@ -26,7 +27,7 @@ from tmsopt import files
 from tmsopt.errors import Fault, InputError, input_error
 from tmsopt.files import from_json, list_differences
 from tmsopt.studies.old_stores import read_batches, read_columns
-from tmsopt.studies.rows import BLOCK, SAVED, STATUSES, Batch, column_of
+from tmsopt.studies.rows import CHUNK_ROWS, SCALAR_FIELDS, STATUSES, Batch, column_of
 from tmsopt.studies.study import Study, definition
 from tmsopt.versions import installed_versions, ipopt_version
 
@@ -36,11 +37,11 @@ APPLICATION = 0x746D736F
 SCHEMA = 3
 """Schema of new stores; `old_stores` reads the schemas 1 and 2."""
 
-LARGEST = 2**27
-"""Largest number of bytes of one value; a column of the largest study has fewer."""
+MAX_VALUE_BYTES = 2**27
+"""Largest number of bytes of one value in SQLite; a column of the largest possible study has fewer bytes."""
 
 _INTEGER = "INTEGER NOT NULL DEFAULT 0"
-_SQL = {int: _INTEGER, bool: _INTEGER, float: "REAL DEFAULT 0", str: "TEXT NOT NULL DEFAULT ''"}
+_SQL_TYPES = {int: _INTEGER, bool: _INTEGER, float: "REAL DEFAULT 0", str: "TEXT NOT NULL DEFAULT ''"}
 _TABLES = f"""
 PRAGMA application_id={APPLICATION};
 PRAGMA user_version={SCHEMA};
@@ -49,34 +50,36 @@ CREATE TABLE columns (name TEXT PRIMARY KEY, doubles BLOB NOT NULL);
 CREATE TABLE numbers (header TEXT PRIMARY KEY);
 CREATE TABLE sessions (id INTEGER PRIMARY KEY, started TEXT NOT NULL, ended TEXT, pid INTEGER NOT NULL,
     host TEXT NOT NULL, versions TEXT NOT NULL, rows INTEGER NOT NULL DEFAULT 0);
-CREATE TABLE rows ({", ".join(f"{name} {_SQL[kind]}" for name, kind in SAVED.items())}, numbers BLOB NOT NULL,
-    PRIMARY KEY (number));
+CREATE TABLE rows ({", ".join(f"{name} {_SQL_TYPES[kind]}" for name, kind in SCALAR_FIELDS.items())},
+    numbers BLOB NOT NULL, PRIMARY KEY (number));
 """
-_SESSION = "started, ended, pid, host, versions, rows"
-_ROW = ", ".join((*SAVED, "numbers"))
-_STUDY = ("study", "columns")  # tables that describe the study
-_ONE_FILE = "PRAGMA journal_mode=DELETE"  # makes the store a single file, unless another process reads it
-_ABSENT = b"\xff"  # eight of these bytes are a nan
-_COMPANIONS = ("-journal", "-wal", "-shm")  # endings of files that SQLite writes next to the store
+# Names of the columns of the tables `sessions` and `rows`.
+_SESSION_COLUMNS = "started, ended, pid, host, versions, rows"
+_ROW_COLUMNS = ", ".join((*SCALAR_FIELDS, "numbers"))
+_STUDY_TABLES = ("study", "columns")  # tables that describe the study
+_MAKE_ONE_FILE = "PRAGMA journal_mode=DELETE"  # no second file, unless another process reads the store
+_NAN_BYTE = b"\xff"  # eight of these bytes are a nan
+_COMPANION_ENDINGS = ("-journal", "-wal", "-shm")  # endings of files that SQLite writes next to the store
 _LOCK_SECONDS = 60.0  # longest time to wait for a lock of another process
 _MAX_DIFFERENCES = 20  # largest number of differences that are listed
 _PACKAGES = ("tmsopt", "casadi", "numpy", "scipy", "python-flint")  # packages that affect the numbers of a row
 
 _DAMAGED = "is damaged; --fresh moves it aside and starts a new store, or give another --store"
-_FULL = "reading or writing fails, or the disk is full; make room and run the same command again, the rows are safe"
-_PLACE = "cannot be opened or written here; give a file in a writable folder"
-_BUSY = f"another program kept it locked for {_LOCK_SECONDS:g} s; end that and run the same command again"
-_MEANINGS = {
-    sqlite3.SQLITE_FULL: _FULL,
-    sqlite3.SQLITE_IOERR: _FULL,
-    sqlite3.SQLITE_READONLY: _PLACE,
-    sqlite3.SQLITE_PERM: _PLACE,
-    sqlite3.SQLITE_CANTOPEN: _PLACE,
+_DISK_FULL = "cannot be read or written, or the disk is full; make room and run the command again; saved rows are safe"
+_NOT_WRITABLE = "cannot be opened or written here; give a file in a writable folder"
+_LOCKED = f"another program kept the store locked for {_LOCK_SECONDS:g} s; end that program and run the command again"
+_MESSAGE_BY_CODE = {
+    sqlite3.SQLITE_FULL: _DISK_FULL,
+    sqlite3.SQLITE_IOERR: _DISK_FULL,
+    sqlite3.SQLITE_READONLY: _NOT_WRITABLE,
+    sqlite3.SQLITE_PERM: _NOT_WRITABLE,
+    sqlite3.SQLITE_CANTOPEN: _NOT_WRITABLE,
     sqlite3.SQLITE_NOTADB: "is not a store of tmsopt; give another file",
-    sqlite3.SQLITE_BUSY: _BUSY,
-    sqlite3.SQLITE_LOCKED: _BUSY,
+    sqlite3.SQLITE_BUSY: _LOCKED,
+    sqlite3.SQLITE_LOCKED: _LOCKED,
     sqlite3.SQLITE_PROTOCOL: "locks do not work on this file system; give a --store on another disk",
 }
+"""Error code of SQLite → message."""
 
 
 def store_error(path: Path, *lines: str) -> InputError:
@@ -96,8 +99,8 @@ def translate_errors(path: Path) -> Iterator[None]:
     except InputError:
         raise
     except sqlite3.DatabaseError as error:
-        meaning = _MEANINGS.get(getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF, _DAMAGED)
-        raise store_error(path, f"{meaning} ({error!s:.200})") from error  # limited, because it may quote the file
+        message = _MESSAGE_BY_CODE.get(getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF, _DAMAGED)
+        raise store_error(path, f"{message} ({error!s:.200})") from error  # short, because the error may quote the file
     except (AttributeError, KeyError, TypeError, ValueError, zlib.error) as error:
         raise store_error(path, f"{_DAMAGED} ({error!s:.200})") from error
     except OSError as error:
@@ -110,7 +113,7 @@ class Store:
 
     Attributes:
         path: path of the file.
-        warnings: lines about changed versions of libraries, and about the place to which ``fresh`` moved the old store.
+        warnings: lines about changed versions of libraries, and about the file to which ``fresh`` moved the old store.
     """
 
     path: Path
@@ -126,15 +129,15 @@ class Store:
         """
         with self._transaction() as connection:
             heads = dict.fromkeys(_read_headers(connection))
-            new_heads = [h for h, x in batch.items() if h not in SAVED and h not in heads and not np.isnan(x).all()]
+            new_heads = [h for h, x in batch.items() if h not in {*SCALAR_FIELDS, *heads} and not np.isnan(x).all()]
             connection.executemany("INSERT INTO numbers VALUES (?)", [(head,) for head in new_heads])
             blanks = np.full(len(batch["number"]), np.nan)
             table = np.column_stack([batch.get(head, blanks) for head in (*heads, *new_heads)] or [blanks])
-            table[np.isnan(table)] = np.frombuffer(8 * _ABSENT)[0]
+            table[np.isnan(table)] = np.frombuffer(8 * _NAN_BYTE)[0]
             doubles, size = table.astype("<f8").tobytes(), 8 * table.shape[1]
-            blobs = [doubles[k : k + size].rstrip(_ABSENT) for k in range(0, len(doubles), size)]
-            lines = zip(*(batch[name].tolist() for name in SAVED), blobs, strict=True)
-            query = f"INSERT OR IGNORE INTO rows ({_ROW}) VALUES ({'?, ' * len(SAVED)}?)"
+            blobs = [doubles[k : k + size].rstrip(_NAN_BYTE) for k in range(0, len(doubles), size)]
+            lines = zip(*(batch[name].tolist() for name in SCALAR_FIELDS), blobs, strict=True)
+            query = f"INSERT OR IGNORE INTO rows ({_ROW_COLUMNS}) VALUES ({'?, ' * len(SCALAR_FIELDS)}?)"
             added = connection.executemany(query, lines).rowcount
             connection.execute("UPDATE sessions SET rows = rows + ? WHERE id = ?", (max(added, 0), self._session))
 
@@ -152,18 +155,18 @@ class Store:
             InputError: for a damaged store.
         """
         batches = list[Batch]()
-        query = f"SELECT {_ROW} FROM rows ORDER BY number"
+        query = f"SELECT {_ROW_COLUMNS} FROM rows ORDER BY number"
         with translate_errors(self.path), closing(self._connection.execute(query)) as cursor:
-            while lines := cursor.fetchmany(BLOCK):
+            while lines := cursor.fetchmany(CHUNK_ROWS):
                 *saved, blobs = zip(*lines, strict=True)
                 batch = {
                     name: column_of([*map(intern, values)] if kind is str else values, kind)  # equal texts share memory
-                    for (name, kind), values in zip(SAVED.items(), saved, strict=True)
+                    for (name, kind), values in zip(SCALAR_FIELDS.items(), saved, strict=True)
                 }
                 if not set(batch["status"]) <= set(STATUSES):
                     raise ValueError("a row has an unknown status")
                 heads = _read_headers(self._connection)
-                doubles = b"".join(blob.ljust(8 * len(heads), _ABSENT) for blob in blobs)
+                doubles = b"".join(blob.ljust(8 * len(heads), _NAN_BYTE) for blob in blobs)
                 table = np.frombuffer(doubles, "<f8").reshape(len(lines), len(heads)).T
                 batches.append(batch | {head: values.copy() for head, values in zip(heads, table, strict=True)})
         return batches
@@ -175,10 +178,10 @@ class Store:
             return {"schema": SCHEMA} | pairs | {n: from_json(pairs[n]) for n in ("definition", "seed", "versions")}
 
     def sessions(self) -> list[dict[str, Any]]:
-        """Every process that wrote, in order: started, ended (None if killed), pid, host, versions, added rows."""
+        """Each process that wrote rows, in order: started, ended (None if killed), pid, host, versions, added rows."""
         with translate_errors(self.path):
-            lines = self._connection.execute(f"SELECT {_SESSION} FROM sessions ORDER BY id").fetchall()
-            sessions = [dict(zip(_SESSION.split(", "), line, strict=True)) for line in lines]
+            lines = self._connection.execute(f"SELECT {_SESSION_COLUMNS} FROM sessions ORDER BY id").fetchall()
+            sessions = [dict(zip(_SESSION_COLUMNS.split(", "), line, strict=True)) for line in lines]
             return [session | {"versions": dict(from_json(session["versions"]))} for session in sessions]
 
     def forget(self, numbers: Iterable[int]) -> None:
@@ -205,24 +208,24 @@ def open_store(path: Path | str, study: Study, *, fresh: bool = False) -> Iterat
             stack.enter_context(_lock(path))
             if fresh and schema:
                 with suppress(sqlite3.Error), closing(_connect(path, "rw")) as old:  # a damaged store is moved as it is
-                    old.execute(_ONE_FILE)
+                    old.execute(_MAKE_ONE_FILE)
                 schema = 0
             if not schema:
-                if any(os.path.lexists(f"{path}{suffix}") for suffix in ("", *_COMPANIONS)):
-                    warnings.append(f"moved the old store to {files.move_aside(path, _COMPANIONS)}")
+                if any(os.path.lexists(f"{path}{suffix}") for suffix in ("", *_COMPANION_ENDINGS)):
+                    warnings.append(f"moved the old store to {files.move_aside(path, _COMPANION_ENDINGS)}")
                 with _replace_database(path) as new:
                     _create_tables(new, *_describe_study(study))
-            check_same(path, study)  # before the store is changed
+            check_same_study(path, study)  # before the store is changed
             if 0 < schema < SCHEMA:
                 with closing(_connect(path, "rw")) as old, _replace_database(path) as new:
-                    old.execute(_ONE_FILE)
+                    old.execute(_MAKE_ONE_FILE)
                     _copy_store(old, new)
             connection = stack.enter_context(closing(_connect(path, "rw")))
             connection.execute("PRAGMA journal_mode=WAL")
             connection.execute("PRAGMA synchronous=NORMAL")  # safe from kill -9
             versions = _versions()
-            records = [record["versions"] for record in Store(path, connection).sessions() if record["rows"]]
-            changes = [line for old in records for line in list_differences(old, versions, ("in the store", "now"))]
+            sides, sessions = ("in the store", "now"), Store(path, connection).sessions()
+            changes = [line for s in sessions if s["rows"] for line in list_differences(s["versions"], versions, sides)]
             line = (_format_now(), os.getpid(), platform.node(), json.dumps(versions))
             query = "INSERT INTO sessions (started, pid, host, versions) VALUES (?, ?, ?, ?)"
             session = connection.execute(query, line).lastrowid or 0
@@ -250,7 +253,7 @@ def view_store(path: Path | str) -> Iterator[Store]:
         yield Store(path, connection)
 
 
-def check_same(path: Path | str, study: Study) -> None:
+def check_same_study(path: Path | str, study: Study) -> None:
     """Check that an existing store belongs to this study.
 
     Raises:
@@ -259,7 +262,7 @@ def check_same(path: Path | str, study: Study) -> None:
     with view_store(path) as store, translate_errors(store.path):
         old, new = (
             from_json(about["definition"]) | {"columns": {name: array("d", x) for name, x in columns.items()}}
-            for about, columns in ([_read_pairs(store._connection, n) for n in _STUDY], _describe_study(study))
+            for about, columns in ([_read_pairs(store._connection, n) for n in _STUDY_TABLES], _describe_study(study))
         )
         differences = list(list_differences(old, new, ("in the store", "in the file")))
         if differences:
@@ -291,7 +294,7 @@ def _describe_study(study: Study) -> tuple[dict[str, str], dict[str, bytes]]:
 def _create_tables(connection: sqlite3.Connection, about: Mapping[str, str], columns: Mapping[str, bytes]) -> None:
     """Create the tables of an empty store."""
     connection.executescript(_TABLES)
-    for table, pairs in zip(_STUDY, (about, columns), strict=True):
+    for table, pairs in zip(_STUDY_TABLES, (about, columns), strict=True):
         connection.executemany(f"INSERT INTO {table} VALUES (?, ?)", pairs.items())
 
 
@@ -302,21 +305,21 @@ def _copy_store(old: sqlite3.Connection, new: sqlite3.Connection) -> None:
     with closing(read_batches(old)) as batches:  # an open cursor would keep the file locked
         for batch in batches:
             store.add(batch)
-    sessions = old.execute(f"SELECT {_SESSION} FROM sessions ORDER BY id").fetchall()
-    new.executemany(f"INSERT INTO sessions ({_SESSION}) VALUES (?, ?, ?, ?, ?, ?)", sessions)
+    sessions = old.execute(f"SELECT {_SESSION_COLUMNS} FROM sessions ORDER BY id").fetchall()
+    new.executemany(f"INSERT INTO sessions ({_SESSION_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?)", sessions)
 
 
 @contextmanager
 def _replace_database(path: Path) -> Iterator[sqlite3.Connection]:
     """An empty database that replaces the file at a path on success; the caller must hold the lock."""
-    with files.write_atomic(path, is_locked=True) as place, closing(_connect(place, "rwc")) as connection:
+    with files.write_atomic(path, is_locked=True) as temporary, closing(_connect(temporary, "rwc")) as connection:
         yield connection
 
 
 def _end_session(connection: sqlite3.Connection, session: int) -> None:
     with suppress(sqlite3.Error):  # a full disk has already raised a better error
         connection.execute("UPDATE sessions SET ended = ? WHERE id = ?", (_format_now(), session))
-        connection.execute(_ONE_FILE)
+        connection.execute(_MAKE_ONE_FILE)
 
 
 @contextmanager
@@ -326,24 +329,25 @@ def _lock(path: Path) -> Iterator[None]:
     try:
         lock.acquire()
     except Timeout:
-        raise store_error(path, _describe_writer(path) if os.path.lexists(lock.lock_file) else _PLACE) from None
+        raise store_error(path, _describe_writer(path) if os.path.lexists(lock.lock_file) else _NOT_WRITABLE) from None
     try:
         yield
     finally:
         with suppress(OSError):
-            Path(lock.lock_file).unlink()  # before the release, although Windows does not remove an open file
+            # The file is removed before the lock is released. On Windows this fails, because the file is open.
+            Path(lock.lock_file).unlink()
         lock.release()
 
 
 def _connect(path: Path, mode: str) -> sqlite3.Connection:
     connection = sqlite3.connect(f"{path.as_uri()}?mode={mode}", uri=True, timeout=_LOCK_SECONDS, isolation_level=None)
-    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)
     connection.execute("PRAGMA trusted_schema=OFF")
     return connection
 
 
 def _inspect_path(location: Path | str) -> tuple[Path, int]:
-    """The path of a store and its schema, 0 if there is none.
+    """The path of a store, and its schema; the schema is 0 if there is no store.
 
     Raises:
         InputError: for a missing folder, a file that is not a store, or a store of a newer tmsopt.
@@ -360,7 +364,7 @@ def _inspect_path(location: Path | str) -> tuple[Path, int]:
         ((application,),) = connection.execute("PRAGMA application_id")
         ((schema,),) = connection.execute("PRAGMA user_version")
     if application != APPLICATION or schema < 1:
-        raise store_error(path, _MEANINGS[sqlite3.SQLITE_NOTADB])
+        raise store_error(path, _MESSAGE_BY_CODE[sqlite3.SQLITE_NOTADB])
     if schema > SCHEMA:
         message = f"is a store of a newer tmsopt: its schema is {schema}, this version reads up to {SCHEMA}"
         raise store_error(path, f"{message}; update tmsopt or give another --store")
@@ -378,13 +382,13 @@ def _check_content(connection: sqlite3.Connection, path: Path) -> None:
 
 
 def _describe_writer(path: Path) -> str:
-    """Name the process that writes a store, and say what to do."""
+    """The message that names the process which writes a store, and says what to do."""
     writer = "another process, which has just started,"
-    with suppress(InputError, IndexError), view_store(path) as store:  # it may be moved aside at this moment
+    with suppress(InputError, IndexError), view_store(path) as store:  # the store may be moved at this moment
         session = store.sessions()[-1]
         if session["ended"] is None:
             writer = f"process {session['pid']} on {session['host']}, since {session['started']},"
-    return f"{writer} writes this store; wait for it or end it, or give another --store"
+    return f"{writer} writes this store; wait until it ends, or end it, or give another --store"
 
 
 def _read_pairs(connection: sqlite3.Connection, table: str) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from tmsopt.problem.limit import limit_value, replace_limit
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.program.options import STARTS
 from tmsopt.records import Array, Column, Table
-from tmsopt.studies.sampling import MOST_ROWS, column_of_numbers, grid
+from tmsopt.studies.sampling import MAX_ROWS, column_of_numbers, grid
 
 _SEED_COUNT = 2**31
 
@@ -38,7 +38,7 @@ class Study:
     """A problem and values that vary from row to row; see `load_study` for its file form.
 
     Attributes:
-        problem: the problem of every row; the varied names have a value here too, which the columns replace.
+        problem: the problem of every row. Its values of the varied names are replaced by those of the columns.
         columns: name → its value in every row (rad, SI units); all have the same length. A name is a fixed parameter,
             ``lambda_s.min`` or ``lambda_s.max`` of a free one, or ``trail.limit``, the number in the constraint
             ``trail``.
@@ -50,7 +50,7 @@ class Study:
         grid_shape: for a full grid, axis → number of values, in the order of the columns; the last axis changes
             fastest. None for other studies.
         method: how the columns were made (grid, list, latin_hypercube, sobol, csv, monte_carlo); does not affect rows.
-        notes: sentences for the reader.
+        notes: sentences for the reader of a report.
 
     Raises:
         InputError: listing all faults with the accepted values.
@@ -75,8 +75,8 @@ class Study:
     notes: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        if messages := list(faults(self)):
-            raise InputError(messages)
+        if found_faults := list(find_faults(self)):
+            raise InputError(found_faults)
         vars(self).update(
             columns=Table({name: Column(values) for name, values in self.columns.items()}),
             report=tuple(dict.fromkeys(text.strip() for text in self.report)),
@@ -128,7 +128,7 @@ class Study:
         return replace(problem, fixed=fixed, free=free, constraints=constraints, start=start)
 
     def seed_of(self, row: int) -> int:
-        """The seed of a row's starts; it depends on this row only, so that a row can be solved alone."""
+        """The seed of a row's starts; it depends on this row only, so that a single row can be solved."""
         state = np.random.SeedSequence(self.seed, spawn_key=(row,)).generate_state(1)
         return int(state[0]) % _SEED_COUNT
 
@@ -170,17 +170,17 @@ def over_grid(
     )
 
 
-def definition(study: Study, column: Callable[[Sequence[float]], Any] = list) -> dict[str, Any]:
+def definition(study: Study, convert_column: Callable[[Sequence[float]], Any] = list) -> dict[str, Any]:
     """Everything that determines the rows of a study, for ``json.dumps``.
 
     Two studies with equal definitions, solved by the same versions, have equal rows. A grid is stored as its axes. The
     definition includes the order of names, because starts depend on the order of the free parameters.
 
     Args:
-        column: converts a column of a study that is not a grid; a list takes four times the memory of an array.
+        convert_column: converts a column of a study that is not a grid. A list takes four times the memory of an array.
     """
     if study.grid_shape is None:
-        columns: dict[str, Any] = {"columns": {name: column(values) for name, values in study.columns.items()}}
+        columns: dict[str, Any] = {"columns": {name: convert_column(values) for name, values in study.columns.items()}}
     else:
         columns = {"grid": {name: values.tolist() for name, values in study.axes.items()}, "axes": list(study.axes)}
     return {
@@ -214,7 +214,7 @@ def _describe_problem(problem: Problem) -> dict[str, Any]:
 # Faults of a study
 
 
-MOST_REPORTED = 1000
+MAX_REPORT_EXPRESSIONS = 1000
 """Largest number of expressions recorded for every row."""
 
 METHODS = ("grid", "list", "latin_hypercube", "sobol", "csv", "monte_carlo")
@@ -224,7 +224,7 @@ UncheckedStudy = Any
 """A Study before validation: any field may be of any type."""
 
 
-def faults(study: UncheckedStudy) -> Iterator[Fault]:
+def find_faults(study: UncheckedStudy) -> Iterator[Fault]:
     """All faults of a study before validation."""
     if not isinstance(study.problem, Problem):
         message = f"found {short(study.problem)}; accepted: a Problem, such as tmsopt.load('problems/least_speed.toml')"
@@ -247,11 +247,11 @@ def variable_names(problem: Posed) -> tuple[str, ...]:
     return fixed + ends + limits
 
 
-def name_faults(problem: Posed) -> Callable[[Any], str]:
-    """A function that says why a name cannot vary; its text is empty for a name that can."""
+def build_name_check(problem: Posed) -> Callable[[Any], str]:
+    """Build a function that says why a name cannot vary; its text is empty for a name that can."""
     accepted, advice = variable_names(problem), limit_advice(suggest)
 
-    def find_fault(name: Any) -> str:
+    def check_name(name: Any) -> str:
         if name in accepted:
             return ""
         stem, _, end = str(name).rpartition(".")
@@ -266,7 +266,7 @@ def name_faults(problem: Posed) -> Callable[[Any], str]:
             return f"neither side of '{text}' is a number; write the constraint with a number alone on one side"
         return f"unknown name {short(name)}; {advice(str(name), accepted)}"
 
-    return find_fault
+    return check_name
 
 
 def _column_faults(study: UncheckedStudy) -> Iterator[Fault]:
@@ -275,11 +275,11 @@ def _column_faults(study: UncheckedStudy) -> Iterator[Fault]:
         yield Fault(f"nothing varies; give at least one column; accepted: {accepted}", ("columns",))
         return
     lengths: dict[str, int] = {}
-    find_fault = name_faults(study.problem.posed)
+    check_name = build_name_check(study.problem.posed)
     for name, values in study.columns.items():
         key, column = ("columns", str(name)), column_of_numbers(values)
-        if wrong := find_fault(name):
-            yield Fault(wrong, key)
+        if message := check_name(name):
+            yield Fault(message, key)
         if column is None:
             yield Fault(f"found {short(values)}; accepted: a list of numbers, such as [0.1, 0.2]", key)
             continue
@@ -287,15 +287,15 @@ def _column_faults(study: UncheckedStudy) -> Iterator[Fault]:
         if bad_rows := np.flatnonzero(~np.isfinite(column)).tolist():
             suffix = f" and {len(bad_rows) - 1} more rows" if len(bad_rows) > 1 else ""
             yield Fault(f"found {column[bad_rows[0]]} in row {bad_rows[0]}{suffix}; accepted: finite numbers", key)
-    rows = next(iter(lengths.values()), 1)
-    if set(lengths.values()) - {rows}:
+    row_count = next(iter(lengths.values()), 1)
+    if set(lengths.values()) - {row_count}:
         text = ", ".join(f"{name} has {length}" for name, length in lengths.items())
         yield Fault(f"columns of different lengths: {text}; give every column one value per row", ("columns",))
-    elif not 1 <= rows <= MOST_ROWS:
-        yield Fault(f"found {rows} rows; accepted: 1 to {MOST_ROWS}", ("columns",))
+    elif not 1 <= row_count <= MAX_ROWS:
+        yield Fault(f"found {row_count} rows; accepted: 1 to {MAX_ROWS}", ("columns",))
     elif study.grid_shape is not None and len(lengths) == len(study.columns) and not _fills_grid(study):
-        accepted = f"a size for each column in order ({', '.join(study.columns)}), the last axis fastest"
-        message = f"found {short(study.grid_shape)} for {rows} rows; accepted: {accepted}; see over_grid"
+        accepted = f"a size for each column in order ({', '.join(study.columns)}); the last axis changes fastest"
+        message = f"found {short(study.grid_shape)} for {row_count} rows; accepted: {accepted}; see over_grid"
         yield Fault(message, ("grid_shape",))
 
 
@@ -327,8 +327,8 @@ def common_faults(problem: Posed, seed: Any, starts: Any, report: Any) -> Iterat
     if report_faults := list_faults("report", report, "['nu_H', '2*Fr_c']"):
         yield from report_faults
         return
-    if len(report) > MOST_REPORTED:
-        yield Fault(f"found {len(report)} expressions; accepted: up to {MOST_REPORTED}", ("report",))
+    if len(report) > MAX_REPORT_EXPRESSIONS:
+        yield Fault(f"found {len(report)} expressions; accepted: up to {MAX_REPORT_EXPRESSIONS}", ("report",))
         return
     for text in report:
         try:

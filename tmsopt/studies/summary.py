@@ -14,6 +14,7 @@ from tmsopt.records import Array, Table, plain
 from tmsopt.studies.rows import STATUSES, Row, RowTable, header
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Quantiles of the abscissa in a `Yield`."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,8 @@ class Share:
 
         if not self.of:
             return 0.0, 1.0
-        limits = binomtest(self.count, self.of).proportion_ci(method="wilson")
-        return float(limits.low), float(limits.high)
+        interval = binomtest(self.count, self.of).proportion_ci(method="wilson")
+        return float(interval.low), float(interval.high)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""
@@ -66,8 +67,8 @@ class Yield:
         return plain(self)
 
 
-_AMOUNT = re.compile(r" by [-+\d.e]+( [^\s,;]+)?")
-_NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
+_AMOUNT = re.compile(r" by [-+\d.e]+( [^\s,;]+)?")  # the amount of a violation in the text of a cause
+_NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")  # any number in the text of a cause
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class Summary:
         counts: status → number of rows.
         best: the optimal row with the best objective; None if there is none.
         causes: cause of rows that are not optimal → number of rows, the most frequent first; causes that differ only in
-            their numbers are one.
+            their numbers are counted together.
         spread: ``objective``, ``abscissa`` → minimum, median and maximum over the optimal rows.
         stable: number of rows with a stable design.
         structures: structure → number of optimal rows, the most frequent first.
@@ -118,38 +119,39 @@ class Summary:
 def summarise(rows: RowTable) -> Summary:
     """Summarise the rows of a study."""
     study, status = rows.study, rows.values("status")
-    counts, optimal = Counter(status.tolist()), status == "optimal"
+    counts, is_optimal = Counter(status.tolist()), status == "optimal"
     values = {name: rows.values(name) for name in ("objective", "abscissa")}
-    clocked = _to_seconds(rows, values)
-    objective = study.problem.posed.sign * clocked.get("objective", values["objective"])
-    ranked = np.where(optimal & np.isfinite(objective), objective, np.inf)
-    spread, in_seconds = (
-        {name: ends for name, x in columns.items() if (ends := _compute_spread(x[optimal]))}
-        for columns in (values, clocked)
+    values_per_second = _convert_to_per_second(rows, values)
+    signed_objective = study.problem.posed.sign * values_per_second.get("objective", values["objective"])
+    costs = np.where(is_optimal & np.isfinite(signed_objective), signed_objective, np.inf)  # the best is the smallest
+    spread, spread_per_second = (
+        {name: ends for name, x in columns.items() if (ends := _compute_spread(x[is_optimal]))}
+        for columns in (values, values_per_second)
     )
     product = compute_yield(rows) if study.method == "monte_carlo" else None
-    if product and "abscissa" in clocked:
-        in_seconds["quantiles"] = _compute_quantiles(clocked["abscissa"][optimal | (status == "infeasible")])
+    if product and "abscissa" in values_per_second:
+        has_result = is_optimal | (status == "infeasible")
+        spread_per_second["quantiles"] = _compute_quantiles(values_per_second["abscissa"][has_result])
     laws = {key: rows.column(head).compressed() for head, (name, key) in rows.headers.items() if name == "laws"}
     return Summary(
         rows=len(study),
         counts=Table({status: counts[status] for status in STATUSES if counts[status]}),
-        best=rows[int(np.argmin(ranked))] if np.isfinite(ranked).any() else None,
+        best=rows[int(np.argmin(costs))] if np.isfinite(costs).any() else None,
         causes=_count_causes(rows),
         spread=Table(spread),
         stable=int(rows.column("stable").sum() or 0),
-        structures=Table(dict(Counter(rows.values("structure")[optimal].tolist()).most_common())),
+        structures=Table(dict(Counter(rows.values("structure")[is_optimal].tolist()).most_common())),
         proven=int(rows.values("proven").sum()),
         warm=int(rows.values("warm").sum()),
         laws=Table({name: float(np.abs(residuals).max()) for name, residuals in laws.items() if residuals.size}),
         seconds=float(rows.values("seconds").sum()),
         product=product,
-        clocked=Table(in_seconds),
+        clocked=Table(spread_per_second),
     )
 
 
-def _to_seconds(rows: RowTable, values: Mapping[str, Array]) -> dict[str, Array]:
-    """Objective and abscissa of every row, converted from √(g/w) to 1/s if possible; w may vary between rows."""
+def _convert_to_per_second(rows: RowTable, values: Mapping[str, Array]) -> dict[str, Array]:
+    """Objective and abscissa of every row, converted from √(g/w) to 1/s if possible; w may differ between rows."""
     problem = rows.study.problem.posed
     parameters = {name: rows.values(header("parameters", name)) for name in problem.parameter_set.names}
     texts = {"objective": problem.goal, "abscissa": "abscissa"}
@@ -171,14 +173,16 @@ def _compute_spread(values: Array) -> tuple[float, ...]:
 
 
 def compute_yield(rows: RowTable) -> Yield:
-    """Shares of stable and feasible rows, and quantiles of their abscissa."""
-    status, stable = rows.values("status"), rows.column("stable").filled(False)
-    feasible = status == "optimal"
-    answered = feasible | (status == "infeasible")
-    total = int(answered.sum())
-    quantiles = zip((f"{q:g}" for q in QUANTILES), _compute_quantiles(rows.values("abscissa")[answered]), strict=False)
-    shares = [Share(int((condition & answered).sum()), total) for condition in (stable, feasible, stable & feasible)]
-    return Yield(shares[0], shares[1], shares[2], len(status) - total, Table(dict(quantiles)))
+    """Shares of stable and of feasible rows, and quantiles of the abscissa, over all rows that have a result."""
+    status, is_stable = rows.values("status"), rows.column("stable").filled(False)
+    is_feasible = status == "optimal"
+    has_result = is_feasible | (status == "infeasible")
+    total = int(has_result.sum())
+    values = _compute_quantiles(rows.values("abscissa")[has_result])
+    quantiles = zip((f"{q:g}" for q in QUANTILES), values, strict=False)
+    masks = is_stable, is_feasible, is_stable & is_feasible
+    stable, feasible, good = (Share(int((mask & has_result).sum()), total) for mask in masks)
+    return Yield(stable, feasible, good, len(status) - total, Table(dict(quantiles)))
 
 
 def _compute_quantiles(abscissa: Array) -> tuple[float, ...]:

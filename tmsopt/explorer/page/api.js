@@ -1,4 +1,4 @@
-// What programs may ask of the page, in the units of the file: window.tmsopt.
+// The functions of the page for other programs, as window.tmsopt. Values are in the units of the file.
 
 const KIND_WORDS = OF_H ? CLASS_WORDS : ["undefined", "capsize", "weave", "stable", "heavily damped"];
 
@@ -15,7 +15,7 @@ window.tmsopt = {
     change({x: wanted});
   },
 
-  /** The design that is shown, and what it is. */
+  /** The design that the page shows, with its roots, stability and quantities. */
   get() {
     const {meetings, motion, kind, y, known} = drawingOf();
     const all = allRoots(meetings);
@@ -33,8 +33,9 @@ window.tmsopt = {
   },
 
   /**
-   * Lean and steer in rad after a lean in degrees and an impulse of steer torque, for so many seconds (without units
-   * √(w/g)); `falls`: when it falls, else null. Null without a bicycle, or where it cannot be solved.
+   * Lean and steer in rad after a lean in degrees and an impulse of steer torque, for a number of seconds (of √(w/g) if
+   * the model has no units). `falls` is the time of the fall, or null. The result is null if the model is no bicycle or
+   * its equations cannot be solved.
    */
   motion({lean = state.lean, push = state.push, seconds = 3} = {}) {
     const system = DATA.bicycle && systemOf(state.x);

@@ -1,4 +1,4 @@
-// What all pictures share: sharp canvases, the page's colours, numbers, ticks, axes, legends, pointer and keys.
+// Functions that all pictures use: for sharp canvases, colours, numbers, ticks, axes, legends, pointer and keys.
 
 const COLOUR_NAMES = [
   "stable",
@@ -14,11 +14,12 @@ const COLOUR_NAMES = [
   "faint",
 ];
 const PICTURE_FONT = "12px system-ui, sans-serif";
-// pixels for the numbers and the label of a vertical axis
+// width in pixels of the numbers and the label of a vertical axis
 const PLOT_LEFT = 68;
 const DASHES = {whole: [], long: [9, 4], short: [4, 3], dots: [1.5, 3], mixed: [8, 3, 2, 3]};
+// functions that draw each canvas again
 const repaints = [];
-// verdicts of the package on what is neither stable nor unstable
+// verdicts of the package on designs that are neither stable nor unstable
 const EDGES = ["marginally stable", "growing", "on the edge of stability"];
 
 const PICTURE_STYLE = `
@@ -35,7 +36,7 @@ const PICTURE_STYLE = `
 .moves input { width: 4.2rem; min-height: 2.25rem; padding: 0 .35rem; text-align: right; }
 `;
 
-/** An element with attributes and text, appended to a parent. */
+/** Make an element with attributes and text, and append it to a parent. */
 function part(parent, tag, attributes = {}, text = "") {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
@@ -44,8 +45,8 @@ function part(parent, tag, attributes = {}, text = "") {
   return made;
 }
 
-/** The colours of the page as they are now. */
-function coloursNow() {
+/** The current colours of the page: name → colour. */
+function currentColours() {
   const style = getComputedStyle(document.documentElement);
   return Object.fromEntries(
     COLOUR_NAMES.map((name) => [name, style.getPropertyValue(`--${name}`).trim() || "#808080"]),
@@ -54,20 +55,20 @@ function coloursNow() {
 
 const colourReader = document.createElement("canvas").getContext("2d");
 
-/** Red, green, blue of a colour written in any way that CSS knows. */
+/** Red, green and blue of a colour in any notation of CSS. */
 function rgbOf(colour) {
   colourReader.fillStyle = colour;
-  // an opaque one is always read as #rrggbb
+  // an opaque colour is always read as #rrggbb
   return [1, 3, 5].map((k) => parseInt(colourReader.fillStyle.slice(k, k + 2), 16));
 }
 
-/** A colour between two, `share` of the second. */
+/** A mixture of two colours; `share` is the fraction of the second. */
 function mixed(first, second, share) {
   const [from, to] = [rgbOf(first), rgbOf(second)];
   return `rgb(${from.map((value, k) => Math.round(value + share * (to[k] - value))).join(",")})`;
 }
 
-/** Fills of the classes, undefined to heavily damped: told apart by lightness too. */
+/** Fill colours of the classes, from undefined to heavily damped. They also differ in lightness. */
 function classFills(colours) {
   const {paper, ink, stable, heavy} = colours;
   return [paper, mixed(paper, ink, 0.38), mixed(paper, ink, 0.1), mixed(paper, stable, 0.62), mixed(paper, heavy, 0.8)];
@@ -86,7 +87,7 @@ function classWords(kind) {
   ][kind];
 }
 
-/** How far from the imaginary axis roots [re, im, multiplicity] cannot be told to stand. */
+/** Distance from the imaginary axis below which roots [re, im, multiplicity] may be on it, because of rounding. */
 function roundingOf(roots) {
   return DATA.onAxis * Math.max(0, ...roots.map(([re, im]) => Math.hypot(re, im + (DATA.carrier ?? 0))));
 }
@@ -96,20 +97,20 @@ function rightmostOf(roots) {
   return Math.max(...roots.map(([re]) => re));
 }
 
-/** Whether roots stand on the imaginary axis and none to its right, as far as can be computed. */
+/** Whether the rightmost roots are on the imaginary axis, up to rounding. */
 function isMarginal(roots) {
   return Math.abs(rightmostOf(roots)) <= roundingOf(roots);
 }
 
-/** Whether a design of a class is on the edge of stability; signs are exact but for the rounding of a carrier. */
+/** Whether a design of a class is on the edge of stability. The signs are exact, except for the rounding of a carrier. */
 function isOnEdge(kind, roots, known) {
   if (known?.verdict) return EDGES.includes(known.verdict);
   return kind > 0 && (kind < 3 ? rightmostOf(roots) <= roundingOf(roots) : OF_H && isMarginal(roots));
 }
 
 /**
- * The word for a design on the edge: that of the command where it is known; else a multiple root leaves open whether it
- * grows, for of eigenvectors the page knows nothing.
+ * The word for a design on the edge of stability. For a known design it is the verdict of the command. Otherwise a
+ * multiple root leaves open whether motion grows, because the page does not compute eigenvectors.
  */
 function edgeWord(roots, known) {
   const near = rightmostOf(roots) - roundingOf(roots);
@@ -117,7 +118,7 @@ function edgeWord(roots, known) {
   return known?.verdict || (open ? "marginal" : "marginally stable");
 }
 
-/** Words for a design with such roots: its class, and what of the boundaries it stands on. */
+/** Words for a design with these roots: its class, and the boundary on which it lies. */
 function designWords(kind, roots, known) {
   if (!OF_H && kind > 2 && roots.every(([, im]) => im === 0) && roots.some((root) => root[2] > 1))
     return "stable, on the edge of heavy damping: nothing swings";
@@ -125,7 +126,7 @@ function designWords(kind, roots, known) {
   return `${edgeWord(roots, known)}: ${ROOTS} on ${AXIS}, as far as can be computed`;
 }
 
-/** A number for people: so many digits, a true minus, powers of ten in words of digits. */
+/** A number for readers: with a number of digits, a minus sign, and powers of ten in raised digits. */
 function figure(value, digits = 4) {
   if (Number.isNaN(value)) return "none";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
@@ -141,7 +142,7 @@ function symbolOf(k) {
   return DATA.parameters[k].name;
 }
 
-/** A value, or the end of a range that is nearest. */
+/** A value, or the nearest end of a range if the value is outside. */
 function clamp(low, value, high) {
   return Math.min(high, Math.max(low, value));
 }
@@ -163,7 +164,7 @@ function rootsInWords(roots, digits = 4, rate = 1) {
   return roots.map(words).join(", ");
 }
 
-/** The eigenfrequency of a complex system that decays or grows so fast. */
+/** The eigenfrequency of a complex system as text, from its growth rate and its frequency. */
 function frequencyText(growth, frequency, digits) {
   const nothing = DATA.onAxis * Math.hypot(growth, frequency, DATA.carrier);
   const [re, im] = [frequency, growth].map((part) => (Math.abs(part) > nothing ? part : 0));
@@ -177,13 +178,13 @@ function withLabelUnit(label, unit) {
   return unit ? `${label} in ${unit}` : label;
 }
 
-/** A value of a parameter, or the end of its range that is nearest. */
+/** A value of a parameter, or the nearest end of its range if the value is outside. */
 function withinRange(k, value) {
   const [low, high] = rangeOf(k);
   return clamp(low, value, high);
 }
 
-/** Round values between two, about so many. */
+/** Round values between two values; `about` is their approximate number. */
 function ticksBetween(low, high, about) {
   const width = (high - low) / Math.max(about, 1);
   if (!(width > 0) || !Number.isFinite(width)) return [];
@@ -194,7 +195,7 @@ function ticksBetween(low, high, about) {
   return Array.from({length: Math.max(0, count) + 1}, (_, k) => Number(((first + k) * step).toPrecision(12)));
 }
 
-/** What to write along the axis of a parameter. */
+/** The label of the axis of a parameter. */
 function parameterLabel(k, room) {
   const {name, meaning, unit} = DATA.parameters[k];
   const short = withLabelUnit(name, unit);
@@ -211,7 +212,7 @@ function rangeOf(k) {
   return [value - room, value + room];
 }
 
-/** A canvas as wide as its host and sharp on its screen; `paint(context, width, height)` draws all of it. */
+/** A canvas that is as wide as its host, and sharp on the screen. `paint(context, width, height)` draws its content. */
 function canvasIn(host, heightOf, paint) {
   const holder = part(host, "div", {class: "picture"});
   const canvas = part(holder, "canvas", {role: "img"});
@@ -236,7 +237,7 @@ function canvasIn(host, heightOf, paint) {
   return {canvas, repaint};
 }
 
-/** Draw all again when the page turns dark or light, which no change of the state says. */
+/** Draw all canvases again when the page turns dark or light, which does not change the state. */
 function watchColours() {
   const style = part(document.head, "style");
   style.textContent = PICTURE_STYLE;
@@ -246,7 +247,7 @@ function watchColours() {
 }
 watchColours();
 
-/** Linear scales of a plot inside a box of a canvas, and the values at its points. */
+/** Linear scales of a plot inside a box of a canvas: from values to pixels, and from pixels to values. */
 function plotIn(box, [left, right], [bottom, top]) {
   const across = box.width / (right - left);
   const up = box.height / (top - bottom);
@@ -265,12 +266,12 @@ function plotIn(box, [left, right], [bottom, top]) {
   };
 }
 
-/** Where the plot of a canvas stands, in pixels of the page, for whoever looks from outside. */
-function tellPlot(canvas, {x0, y0, width, height}) {
+/** Write the position of a plot in its canvas, in pixels, to an attribute, which other programs can read. */
+function exposePlot(canvas, {x0, y0, width, height}) {
   canvas.dataset.plot = [x0, y0, width, height].join(" ");
 }
 
-/** Draw with the plot's box as the limit of what is seen. */
+/** Draw inside the box of a plot only. */
 function clipped(context, plot, draw) {
   context.save();
   context.beginPath();
@@ -280,7 +281,7 @@ function clipped(context, plot, draw) {
   context.restore();
 }
 
-/** Frame, ticks, numbers and labels of a plot; `x` and `y` are {label, one}, without a label no numbers below. */
+/** Draw frame, ticks, numbers and labels of a plot. `x` and `y` are {label, one}; without a label, x has no numbers. */
 function drawAxes(context, plot, x, y, colours) {
   const {x0, y0, width, height} = plot;
   Object.assign(context, {lineWidth: 1, fillStyle: colours.ink, strokeStyle: colours.faint});
@@ -289,7 +290,7 @@ function drawAxes(context, plot, x, y, colours) {
     const at = Math.round(plot.x(tick * x.one)) + 0.5;
     drawStraight(context, [at, y0 + height], [at, y0 + height + 4], colours.faint, 1);
     const text = figure(tick, 12);
-    // the last must not leave the canvas, beyond whose plot 12 pixels remain
+    // the last number must stay in the canvas, which has 12 pixels to the right of the plot
     const rightmost = x0 + width + 11 - context.measureText(text).width / 2;
     if (x.label) context.fillText(text, Math.min(at, rightmost), y0 + height + 13);
   }
@@ -310,14 +311,14 @@ function drawAxes(context, plot, x, y, colours) {
   context.restore();
 }
 
-/** A line through points {x, y} in pixels, of a colour, width and dash. */
+/** Draw a line through points {x, y} in pixels, with a colour, width and dash. */
 function drawLine(context, points, colour, width = 1.5, dash = DASHES.whole, offset = 0) {
   context.strokeStyle = colour;
   context.lineWidth = width;
   context.setLineDash(dash);
   context.lineDashOffset = offset;
   context.beginPath();
-  for (const {x, y} of points) context.lineTo(x, y); // the first begins the path
+  for (const {x, y} of points) context.lineTo(x, y); // the first point begins the path
   context.stroke();
   context.setLineDash(DASHES.whole);
 }
@@ -367,7 +368,7 @@ function drawBox(context, x, y, width, height, colour) {
   context.fillRect(x, y, width, height);
 }
 
-/** Fill a canvas rectangle with slanted lines: the sign of what is undefined. */
+/** Fill a canvas rectangle with slanted lines, which mark undefined designs. */
 function drawHatch(context, x, y, width, height, colour, apart = 6) {
   clipped(context, {x0: x, y0: y, width, height}, () => {
     for (let at = x - height; at < x + width; at += apart)
@@ -375,7 +376,7 @@ function drawHatch(context, x, y, width, height, colour, apart = 6) {
   });
 }
 
-/** A list of swatches and words; built again only when the words or colours change. */
+/** A legend: a list of signs and words, which is built again only if the words or colours change. */
 function legendIn(host) {
   const list = part(host, "ul", {class: "legend"});
   let shown = "";
@@ -397,7 +398,7 @@ function legendIn(host) {
   };
 }
 
-/** An entry of a legend: a filled box, hatched on request. */
+/** An entry of a legend: a filled box, hatched if a hatch colour is given. */
 function boxEntry(words, colour, outline, hatch = "") {
   const sign = (context) => {
     drawBox(context, 0, 0, 30, 14, colour);
@@ -419,8 +420,8 @@ function dotEntry(words, fill, outline) {
   return {words, look: [fill, outline], sign: (context) => drawDot(context, 15, 7, 4.5, fill, outline)};
 }
 
-/** Say what a canvas shows once it has rested, so that a screen reader is not flooded. */
-function saysIn(canvas) {
+/** Describe a canvas to screen readers. The text is set after a pause, so that not every change is read aloud. */
+function makeDescriber(canvas) {
   let waiting = 0;
   return (text) => {
     clearTimeout(waiting);
@@ -429,39 +430,39 @@ function saysIn(canvas) {
   };
 }
 
-/** Let a picture have the keyboard, which a screen reader keeps from mere images. */
-function takesKeys(canvas) {
+/** Let a picture receive keys; a screen reader does not pass them to plain images. */
+function acceptKeys(canvas) {
   canvas.tabIndex = 0;
   canvas.setAttribute("role", "application");
   canvas.setAttribute("aria-roledescription", "picture with arrow keys");
 }
 
-/** Let the pointer and the arrow keys move the design: `at(x, y)` and `step(dx, dy)` give [[index, value] ..]. */
-function movesDesign(canvas, at, step) {
-  const place = (event) => {
+/** Let the pointer and the arrow keys move the design. `at(x, y)` and `step(dx, dy)` return [[index, value] ..]. */
+function addDesignMoves(canvas, at, step) {
+  const changesAt = (event) => {
     const box = canvas.getBoundingClientRect();
     return at(event.clientX - box.left, event.clientY - box.top);
   };
-  let held = false;
+  let isHeld = false;
   let before = [];
-  let keyed = null;
-  takesKeys(canvas);
+  let movedByKey = null;
+  acceptKeys(canvas);
   canvas.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
-    held = true;
-    before = place(event).map(([k]) => [k, state.x[k]]);
+    isHeld = true;
+    before = changesAt(event).map(([k]) => [k, state.x[k]]);
     canvas.setPointerCapture(event.pointerId);
-    change({x: place(event)}, false);
+    change({x: changesAt(event)}, false);
   });
-  canvas.addEventListener("pointermove", (event) => held && change({x: place(event)}, false));
+  canvas.addEventListener("pointermove", (event) => isHeld && change({x: changesAt(event)}, false));
   canvas.addEventListener("pointerup", (event) => {
-    if (held) change({x: place(event)});
-    held = false;
+    if (isHeld) change({x: changesAt(event)});
+    isHeld = false;
   });
   canvas.addEventListener("pointercancel", () => {
-    // the finger was to scroll the page
-    if (held) change({x: before});
-    held = false;
+    // the user scrolls the page with this finger
+    if (isHeld) change({x: before});
+    isHeld = false;
   });
   const arrows = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
   canvas.addEventListener("keydown", (event) => {
@@ -473,25 +474,25 @@ function movesDesign(canvas, at, step) {
       !event.metaKey &&
       step(...arrow.map((k) => k * (event.shiftKey ? 10 : 1)));
     if (!moved) return;
-    keyed = moved;
+    movedByKey = moved;
     event.preventDefault();
     change({x: moved}, false);
   });
   const settle = () => {
-    if (keyed) change({x: keyed});
-    keyed = null;
+    if (movedByKey) change({x: movedByKey});
+    movedByKey = null;
   };
   canvas.addEventListener("keyup", settle);
   canvas.addEventListener("blur", settle);
 }
 
-/** The lower middle of the sizes of roots, each as often as it counts: that of most, however far the others are. */
+/** The lower median of the sizes of roots, each counted with its multiplicity. A few large roots do not change it. */
 function typicalSize(roots, sizeOf) {
   const sizes = roots.flatMap((root) => Array(root[2] * (root[1] > 0 ? 2 : 1)).fill(sizeOf(root)));
   return sizes.sort((first, second) => first - second)[Math.floor((sizes.length - 1) / 2)] || 0;
 }
 
-/** The design of the file that the state is, digit for digit, or undefined. */
+/** The known design with exactly these parameters, or undefined. */
 function knownDesign(x) {
   return DATA.designs.find(({values}) => values.every((value, k) => value === x[k]));
 }

@@ -1,8 +1,10 @@
-// The bicycle to scale, from the right side and from behind, as it leans and steers after a start; its tracks from above.
+// The moving bicycle, to scale, from the right side and from behind, and the tracks of its wheels from above.
 
 const SLOWNESS = [1, 2, 5, 10, 50];
 
-/** The bicycle of a design: lengths in m, or in wheelbases where the model has no units; x forward, y right, z down. */
+/**
+ * The geometry of a design. Lengths are in m, or in wheelbases if the model has no units; x is forward, y right, z down.
+ */
 function bicycleShape(x) {
   const named = Object.fromEntries(DATA.parameters.map(({name}, k) => [name, x[k]]));
   const of = (name, other, instead = 0) => named[name] ?? named[other] ?? instead;
@@ -37,11 +39,11 @@ function bicycleShape(x) {
   };
 }
 
-/** A point after the front assembly has turned about the steer axis and all has leaned about the line of contacts. */
+/** A point after steering (a rotation about the steer axis) and leaning (a rotation about the line of contacts). */
 function movedPoint(shape, point, ofFront, lean, steer) {
   let [x, y, z] = point;
   if (ofFront && steer) {
-    // Rodrigues' rotation, positive to the right: about the axis downward
+    // Rodrigues' formula; the axis points down, so that a positive angle steers to the right
     const axis = shape.up.map((value) => -value);
     const arm = [x - shape.meets[0], y - shape.meets[1], z - shape.meets[2]];
     const [cosine, sine] = [Math.cos(steer), Math.sin(steer)];
@@ -56,13 +58,13 @@ function movedPoint(shape, point, ofFront, lean, steer) {
   return [x, y * Math.cos(lean) - z * Math.sin(lean), y * Math.sin(lean) + z * Math.cos(lean)];
 }
 
-/** The lines of the bicycle: {front, points, kind} in its upright place. */
+/** The lines of the upright bicycle: {front, points, kind}; `front` is true for lines of the front assembly. */
 function bicycleLines(shape, travelled) {
   const {w, rear, front, B, H, onAxis, alongAxis, tall, contact} = shape;
   const hub = [0, 0, -rear];
   const frontHub = [w, 0, -front];
   const head = onAxis(0.62 * tall);
-  // where the front assembly is joined, between the ground and the handlebar
+  // the point of the steer axis where a part is joined, between the ground and the handlebar
   const joined = (point) => onAxis(clamp(0.04 * tall, alongAxis(point), 0.9 * tall));
   const lowest = [front ? frontHub : contact, H].map(joined).sort((one, other) => other[2] - one[2])[0];
   const lines = [
@@ -120,10 +122,10 @@ function bicyclePicture(host) {
   }
   const calm = matchMedia("(prefers-reduced-motion: reduce)");
   let now = null;
-  let last = 0;
-  let stopped = calm.matches;
-  let resting = 0;
-  let moved = "";
+  let lastMoment = 0;
+  let isStopped = calm.matches;
+  let startTimer = 0;
+  let lastDesign = "";
   const starts = part(host, "div", {class: "moves"});
   const fields = [
     startField("lean", "start lean", "°", "to the right"),
@@ -139,8 +141,8 @@ function bicyclePicture(host) {
   const real = clockPace(DATA.start) === 1 ? "in real time" : "in real time, w = 1 m";
   for (const value of SLOWNESS) part(slower, "option", {value}, value > 1 ? `${value} times slower` : real);
   const legend = legendIn(host);
-  const says = saysIn(surface.canvas);
-  const saysAbove = saysIn(above.canvas);
+  const says = makeDescriber(surface.canvas);
+  const saysAbove = makeDescriber(above.canvas);
   clock.watchers.push(() => {
     surface.repaint();
     above.repaint();
@@ -148,7 +150,7 @@ function bicyclePicture(host) {
 
   function paint(context, width, height) {
     if (!now) return;
-    const colours = coloursNow();
+    const colours = currentColours();
     const motion = motionFrom(now.state, now.drawing);
     const time = motion ? Math.min(clock.time, motion.end) : 0;
     const [lean, steer] = motion ? [motion.at(0, time), motion.at(1, time)] : [0, 0];
@@ -216,7 +218,7 @@ function bicyclePicture(host) {
     ]);
   }
 
-  /** A field for what the bicycle starts with. */
+  /** A field for the lean or the push with which the motion starts. */
   function startField(name, words, unit, title) {
     const label = part(starts, "label", {title}, words);
     const field = part(label, "input", {type: "text", autocomplete: "off"});
@@ -235,11 +237,11 @@ function bicyclePicture(host) {
     return draw;
   }
 
-  /** The tracks of both contacts from above, and the bicycle on them; sideways as large as fits. */
+  /** Draw the tracks of both contacts from above, with the bicycle. The sideways scale fits the picture. */
   function paintTracks(context, width, height) {
     const motion = now && motionFrom(now.state, now.drawing);
     if (!motion) return;
-    const colours = coloursNow();
+    const colours = currentColours();
     const {w, speed} = bicycleShape(now.state.x);
     const times = motion.seconds.filter((time) => time < motion.end);
     const tracks = [...times, motion.end].map(motion.contacts);
@@ -266,7 +268,7 @@ function bicyclePicture(host) {
     drawAxes(context, plot, {label: `forward in ${unit}`, one: 1}, {label: `right in ${unit}`, one: 1}, colours);
   }
 
-  /** What both views must hold: from left to right, to each side, and up. */
+  /** The extent of both views: to the left, to the right, to each side, and up. */
   function boundsOf({w, front, rear, B, H, meets, onAxis, tall, top}) {
     const over = onAxis(1.04 * tall)[0];
     return {
@@ -277,14 +279,14 @@ function bicyclePicture(host) {
     };
   }
 
-  /** As high as the bicycle asks for, in steps, so that the page stands still while a slider moves. */
+  /** The height that the bicycle needs, in steps, so that the page does not move while a slider moves. */
   function heightOf(width) {
     const {left, right, side, tallest} = boundsOf(bicycleShape(now ? now.state.x : DATA.start));
     const wanted = 46 + (tallest * (width - 24)) / (right - left + 2 * side);
     return clamp(140, 40 * Math.ceil((wanted || 0) / 40), 420);
   }
 
-  /** By how much the lean is drawn larger than it is, where steering hides it. */
+  /** The factor by which the lean is drawn larger, if it is much smaller than the steering. */
   function enlargement(motion) {
     if (!motion || !(motion.peaks[0] > 0)) return 1;
     const ratio = motion.peaks[1] / motion.peaks[0];
@@ -315,7 +317,7 @@ function bicyclePicture(host) {
     }
   }
 
-  /** A centre of mass: a circle in quarters. */
+  /** Draw a centre of mass: a circle in quarters. */
   function drawMass(context, {x, y}, radius, name, colour, colours, left = false) {
     const size = Math.max(5, radius);
     drawDot(context, x, y, size, colours.paper, colours.ink, 1.5);
@@ -350,9 +352,9 @@ function bicyclePicture(host) {
   function step(moment) {
     const motion = clock.playing && now && motionFrom(now.state, now.drawing);
     if (!motion) return;
-    const passed = (Math.min(0.5, (moment - last) / 1000) * clockPace(now.state.x)) / clock.slower;
+    const passed = (Math.min(0.5, (moment - lastMoment) / 1000) * clockPace(now.state.x)) / clock.slower;
     setClock(Math.min(motion.end, clock.time + passed));
-    last = moment;
+    lastMoment = moment;
     if (clock.time < motion.end) requestAnimationFrame(step);
     else stop();
   }
@@ -362,7 +364,7 @@ function bicyclePicture(host) {
     clock.playing = true;
     setClock(time);
     if (running) return;
-    last = performance.now();
+    lastMoment = performance.now();
     requestAnimationFrame(step);
   }
 
@@ -372,13 +374,13 @@ function bicyclePicture(host) {
   }
 
   play.addEventListener("click", () => {
-    stopped = clock.playing;
+    isStopped = clock.playing;
     const motion = now && motionFrom(now.state, now.drawing);
     if (clock.playing) stop();
     else start(motion && clock.time >= motion.end ? 0 : clock.time);
   });
   again.addEventListener("click", () => {
-    stopped = false;
+    isStopped = false;
     start(0);
   });
   slower.addEventListener("change", () => {
@@ -390,13 +392,13 @@ function bicyclePicture(host) {
       now = {state, drawing};
       fields.forEach((drawField) => drawField());
       const design = [...state.x, state.lean, state.push].join(" ");
-      if (design !== moved) {
-        // motion follows every change of the design once it has rested, unless the reader wants none
-        moved = design;
+      if (design !== lastDesign) {
+        // the motion starts a moment after each change of the design, unless the user has stopped it
+        lastDesign = design;
         clock.playing = false;
         clock.time = 0;
-        clearTimeout(resting);
-        resting = setTimeout(() => !stopped && !calm.matches && start(0), 600);
+        clearTimeout(startTimer);
+        startTimer = setTimeout(() => !isStopped && !calm.matches && start(0), 600);
       }
       surface.repaint();
       above.repaint();

@@ -1,9 +1,9 @@
-// The stability chart over two parameters, all others as they are now.
+// The stability chart over two parameters; the other parameters have their current values.
 
 const CHART_POINTS = 200;
-// the same designs, and one between any two
+// the same grid, with one more design between two neighbours
 const FINE_POINTS = 2 * CHART_POINTS - 1;
-// how long a survey may take while something moves, and once it rests
+// longest time of a survey in ms, while something moves and when nothing moves
 const [SURVEY_MS, FINE_MS] = [35, 100];
 const CURVE_LOOKS = {
   weave: ["whole", 2.4],
@@ -13,12 +13,12 @@ const CURVE_LOOKS = {
   "EP set": ["short", 2.6],
 };
 
-/** Equally spaced values from one to another, both included. */
+/** Equally spaced values of a range, including its ends. */
 function evenly([low, high], count) {
   return Float64Array.from({length: count}, (_, k) => low + ((high - low) * k) / (count - 1));
 }
 
-/** Whether two designs agree in all parameters but some. */
+/** Whether two designs agree in all parameters, except those with the indices `free`. */
 function sameBeside(first, second, free, tolerance) {
   return Array.from(first).every(
     (value, k) =>
@@ -26,7 +26,10 @@ function sameBeside(first, second, free, tolerance) {
   );
 }
 
-/** The traced curves over the plane of the chart, turned where its axes are exchanged; empty where they do not hold. */
+/**
+ * The traced curves over the plane of the chart, with exchanged axes if necessary. Curves that belong to other values of
+ * the remaining parameters are left out.
+ */
 function curvesIn(state) {
   const [i, j] = state.plane;
   return DATA.curves.flatMap((curve) => {
@@ -36,12 +39,12 @@ function curvesIn(state) {
   });
 }
 
-/** Bands of a layer of numbers: edges in steps of one round width below 0, of another above it. */
+/** Bands of a layer of numbers. All bands below 0 have one round width, and all bands above 0 another. */
 function bandsOf(values, layer) {
   if (layer === "damping") return {down: 0.2, up: 0.2, below: 5, above: 5};
   const known = values.filter(Number.isFinite).sort();
   const low = known.length ? Math.min(0, known[0]) : 0;
-  // poles of the abscissa must not take all colours
+  // poles of the abscissa must not use up all colours
   const high = known.length ? Math.max(0, known[Math.floor(0.95 * (known.length - 1))]) : 0;
   const step = (reach) => {
     const [first, second] = ticksBetween(0, reach || 1, 8);
@@ -51,7 +54,7 @@ function bandsOf(values, layer) {
   return {down, up, below: low < 0 ? Math.ceil(-low / down) : 0, above: high > 0 ? Math.ceil(high / up) : 0};
 }
 
-/** The colour of each band from the lowest up: deeper farther from 0; what is good is blue, what is bad orange. */
+/** The colour of each band, from the lowest up. Good values are blue, bad values orange; colours deepen away from 0. */
 function bandColours(bands, goodBelow, colours) {
   const side = (count, good) =>
     Array.from({length: count}, (_, k) =>
@@ -60,19 +63,19 @@ function bandColours(bands, goodBelow, colours) {
   return [...side(bands.below, goodBelow).reverse(), ...side(bands.above, !goodBelow)];
 }
 
-/** The band of a value, from the lowest up; what lies beyond belongs to the last. */
+/** The index of the band of a value. Values beyond all bands belong to the first or the last band. */
 function bandAt(value, {down, up, below, above}) {
   const band = below + (value < 0 ? -Math.ceil(-value / down) : Math.floor(value / up));
   return clamp(0, band, below + above - 1);
 }
 
-/** The chart as an image, a pixel per design, its first row at the top. */
+/** The chart as an image with one pixel per design; the first row is at the top. */
 function chartImage({found, points: size}, layer, colours) {
   const image = new ImageData(size, size);
   const pixels = new Uint32Array(image.data.buffer);
   const packed = (colour) => {
     const [red, green, blue] = rgbOf(colour);
-    // little-endian, as all machines with browsers are
+    // little-endian, as on all machines with browsers
     return (255 << 24) | (blue << 16) | (green << 8) | red;
   };
   const values = layer === "kind" ? null : found[layer];
@@ -93,7 +96,7 @@ function chartImage({found, points: size}, layer, colours) {
   return {image, bands};
 }
 
-/** A bar of the bands with the numbers of their edges, 0 in bold. */
+/** Draw a bar of the bands with the numbers at their edges; 0 is bold. */
 function drawBar(context, x, y, width, bands, layer, colours) {
   const shades = bandColours(bands, layer === "abscissa", colours);
   const cell = width / shades.length;
@@ -109,7 +112,7 @@ function drawBar(context, x, y, width, bands, layer, colours) {
   const zero = x + bands.below * cell;
   for (let edge = 0; edge <= shades.length; edge += 1) {
     const value = edge < bands.below ? (edge - bands.below) * bands.down : (edge - bands.below) * bands.up;
-    // the last bands hold all that the bar does not
+    // the first and the last band also have all values beyond the bar
     const beyond = {0: "≤ ", [shades.length]: "≥ "}[edge];
     const text = (value !== 0 && beyond && layer === "abscissa" ? beyond : "") + figure(value, 12);
     const [at, half] = [x + edge * cell, context.measureText(text).width / 2 + 5];
@@ -122,7 +125,7 @@ function drawBar(context, x, y, width, bands, layer, colours) {
   drawStraight(context, [zero, y - 3], [zero, y + 14], colours.ink, 2);
 }
 
-/** The stability chart: fills, exact curves, known designs, and the current one, which pointer and arrows move. */
+/** The stability chart: fills, exact curves, known designs, and the current design, which pointer and keys move. */
 function chartPicture(host) {
   let now = null;
   let surveyed = {key: ""};
@@ -139,10 +142,10 @@ function chartPicture(host) {
   const surface = canvasIn(host, (width) => clamp(300, 0.78 * width, 560), paint);
   const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
-  const says = saysIn(surface.canvas);
+  const says = makeDescriber(surface.canvas);
   surface.canvas.style.touchAction = "none";
 
-  /** Classes and layers over the plane, where the design's own place plays no part; as fine as time allows. */
+  /** Classes and layers over the plane, on a grid as fine as time allows. They do not depend on the two parameters. */
   function surveyOf(state, fine = false) {
     const [i, j] = state.plane;
     const others = Array.from(state.x, (value, k) => (k === i || k === j ? 0 : value));
@@ -163,7 +166,7 @@ function chartPicture(host) {
     if (!now) return;
     const {state, drawing} = now;
     const [i, j] = state.plane;
-    const colours = coloursNow();
+    const colours = currentColours();
     const {points, present} = surveyOf(state);
     const look = `${surveyed.key} ${points} ${Object.values(colours)}`;
     if (look !== shaded.key) {
@@ -178,9 +181,9 @@ function chartPicture(host) {
       rangeOf(i),
       rangeOf(j),
     );
-    tellPlot(surface.canvas, plot);
+    exposePlot(surface.canvas, plot);
     clipped(context, plot, () => {
-      // a design stands at the middle of its pixel: the first and the last reach half a pixel beyond the ends
+      // a design is at the centre of its pixel, so the first and the last pixel reach half a pixel beyond the ends
       const [dx, dy] = [plot.width / (points - 1), plot.height / (points - 1)];
       context.imageSmoothingEnabled = false;
       context.drawImage(raster, plot.x0 - dx / 2, plot.y0 - dy / 2, plot.width + dx, plot.height + dy);
@@ -214,7 +217,7 @@ function chartPicture(host) {
     for (const curve of curvesIn(state)) {
       const points = Array.from(curve.x, (value, k) => ({x: plot.x(value), y: plot.y(curve.y[k])}));
       const {colour, width, dash} = lookOf(curve, colours);
-      // between two curves of it a sliver is to be seen
+      // without this white edge for heavy damping, the narrow area between two curves stays visible
       if (curve.set !== "heavy damping") drawLine(context, points, colours.paper, width + 0.8);
       drawLine(context, points, colour, width, dash);
     }
@@ -233,7 +236,7 @@ function chartPicture(host) {
     }
   }
 
-  /** Cross hairs at the current design, of which one may be in sight where the other is not. */
+  /** Draw cross hairs at the current design. One of them may be visible if the other is not. */
   function drawHairs(context, x, y, colours) {
     context.globalAlpha = 0.55;
     drawUpright(context, plot, x, colours.ink, 1);
@@ -241,7 +244,7 @@ function chartPicture(host) {
     context.globalAlpha = 1;
   }
 
-  /** The current design: a ring. */
+  /** Draw the current design as a ring. */
   function drawHere(context, x, y, colours) {
     if (!plot.holds(x, y)) return;
     drawDot(context, x, y, 8, "", colours.paper, 5);
@@ -287,7 +290,7 @@ function chartPicture(host) {
     return entries;
   }
 
-  /** What is at a place of the chart, in words. */
+  /** Describe a design of the chart in words. */
   function read(state, words, abscissa, at = state.x) {
     const where = state.plane.map((k) => `${symbolOf(k)} = ${valueText(k, at[k])}`).join(", ");
     const number = Number.isFinite(abscissa)
@@ -304,7 +307,7 @@ function chartPicture(host) {
 
   const placeAt = (px, py) =>
     now.state.plane.map((k, up) => [k, withinRange(k, up ? plot.valueY(py) : plot.valueX(px))]);
-  movesDesign(surface.canvas, placeAt, (...steps) =>
+  addDesignMoves(surface.canvas, placeAt, (...steps) =>
     now.state.plane
       .map((k, up) => {
         const [low, high] = rangeOf(k);

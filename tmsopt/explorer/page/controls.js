@@ -1,54 +1,57 @@
-// Sliders, number fields and selects: all that changes the state but the pictures themselves.
+// Sliders, number fields and selects. These and the pictures change the state.
 
 const SLIDER_STEPS = 1000;
 
-/** What a parameter or quantity means, where it is known, without the names of equations. */
+/** The meaning of a parameter or quantity, without the names of equations; empty if it has none. */
 function meaningOf({meaning}) {
   return meaning === "parameter" ? "" : meaning.replace(/ \(equation \w+\)/, "");
 }
 
-/** A parameter's name, with its meaning where it has one. */
+/** The name of a parameter, with its meaning if it has one. */
 function nameOf(parameter) {
   return [parameter.name, meaningOf(parameter)].filter(Boolean).join(", ");
 }
 
-/** A sentence for those who listen. */
+/** Give a sentence to screen readers. */
 function say(text) {
   by("said").textContent = text;
 }
 
-/** A value in its unit as a field writes it: to read, and, while one writes there, so that the value comes back. */
+/**
+ * Two texts of a value for its field: a short one for reading, and one for editing, from which the exact value can be
+ * read back.
+ */
 function fieldTexts(value, one) {
   const digits = [9, 15, 16, 17].map((n) => Number((value / one).toPrecision(n)));
   return [String(digits[0]).replaceAll("-", "−"), String(digits.find((number) => number * one === value) ?? value / one)];
 }
 
-/** Native slider of a parameter; a drag, or a key held down, is one step of undo. */
+/** The slider of a parameter. A drag, or a key that is held down, is one step of undo. */
 function parameterSlider(k) {
   const {low, high, one, unit} = DATA.parameters[k];
   const slider = element("input", {
     type: "range", min: 0, max: SLIDER_STEPS, step: 1, disabled: !(high > low), "aria-label": nameOf(DATA.parameters[k]),
   });
-  let held = false;
+  let isHeld = false;
   const release = () => {
-    held = false;
+    isHeld = false;
     change({});
   };
   on(slider, "input", () => {
-    const place = Number(slider.value) / SLIDER_STEPS;
-    change({x: [[k, place === 1 ? high : low + (high - low) * place]]}, false);
+    const share = Number(slider.value) / SLIDER_STEPS;
+    change({x: [[k, share === 1 ? high : low + (high - low) * share]]}, false);
   });
-  on(slider, "change", () => held || change({}));
+  on(slider, "change", () => isHeld || change({}));
   on(slider, "keydown", (event) => {
-    const way = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1}[event.key];
-    held ||= !["Tab", "Shift", "Control"].includes(event.key);
-    if (!way) return;
+    const direction = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1}[event.key];
+    isHeld ||= !["Tab", "Shift", "Control"].includes(event.key);
+    if (!direction) return;
     event.preventDefault();
-    const next = state.x[k] + (way * (high - low)) / (SLIDER_STEPS * (event.shiftKey ? 10 : 1));
+    const next = state.x[k] + (direction * (high - low)) / (SLIDER_STEPS * (event.shiftKey ? 10 : 1));
     change({x: [[k, Math.min(high, Math.max(low, next))]]}, false);
   });
-  on(slider, "keyup", () => held && release());
-  on(slider, "blur", () => held && release());
+  on(slider, "keyup", () => isHeld && release());
+  on(slider, "blur", () => isHeld && release());
   const draw = (value) => {
     slider.value = Math.round(((value - low) / (high - low)) * SLIDER_STEPS);
     slider.setAttribute("aria-valuetext", withUnit(value / one, unit));
@@ -56,7 +59,7 @@ function parameterSlider(k) {
   return {slider, draw};
 }
 
-/** Field for any possible value of a parameter; anything else is refused, with the reason in a message. */
+/** The field of a parameter. It accepts every possible value; a message gives the reason why it rejects other texts. */
 function parameterField(k, message) {
   const parameter = DATA.parameters[k];
   const {name, one, unit, low} = parameter;

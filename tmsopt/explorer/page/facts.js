@@ -1,14 +1,14 @@
-// What is true of the design shown: the verdict, limits, numbers, and what was found out before.
+// Facts about the design that the page shows: verdict, limits, numbers, and the results known before.
 
 const CLASS_WORDS = OF_H
   ? ["undefined", "gain", "gain", "stable", "stable"]
   : ["undefined", DATA.words.capsize, DATA.words.weave, "stable", "heavily damped"];
 
-// units of time, by that of the roots
+// unit of the roots → unit of time
 const TIMES = {"√(g/w)": "√(w/g)", "1/s": "s"};
 const MARKS = {undefined: "?", marginal: "≈", "marginally stable": "≈", growing: "✗", unstable: "✗"};
 
-/** How near the axis rounding does not tell, and how many roots at most meet where the slowest part is. */
+/** `near`: distance from the axis that rounding hides; `times`: largest multiplicity of the roots that decay slowest. */
 function slowestOf({motion, meetings}) {
   const near = roundingOf(meetings);
   return {near, times: Math.max(1, ...meetings.filter(([re]) => re >= motion[0] - near).map((root) => root[2]))};
@@ -42,16 +42,16 @@ function verdictOf(drawing) {
   return [edge ? "stable" : CLASS_WORDS[kind], `Every disturbance dies out${still}, slowest as ${term}`];
 }
 
-/** A bicycle's wheels that no weight holds down. */
-function liftsOf(y) {
+/** Sentences about the wheels of a bicycle that no load holds on the ground. */
+function liftSentences(y) {
   return ["front", "rear"].flatMap((wheel) => {
     const load = y[DATA.quantities.findIndex(({name}) => DATA.bicycle && name === `load_${wheel}`)];
     return load < 0 ? [`the ${wheel} wheel would lift (load ${figure(100 * load, 2)} %)`] : [];
   });
 }
 
-/** The known design that is shown, or one so close that only its roots tell them apart. */
-function nearnessOf(known) {
+/** Text about the known design that is shown, or about one that is so close that only its roots differ. */
+function describeNearest(known) {
   if (known) return `${known.name}: ${known.structure}`;
   const near = DATA.designs.find(({values}) => sameBeside(state.x, values, [], 1e-5));
   return near ? `close to ${near.name}${hasMeeting(near.roots) ? `, whose ${ROOTS} are sensitive` : ""}: its button goes there` : "";
@@ -62,7 +62,7 @@ function hasMeeting(roots) {
   return roots.some((root) => root[2] > 1);
 }
 
-/** How many limits hold, in words; empty where there are none. */
+/** Whether all limits hold, in words; empty if there are no limits. */
 function limitsInWords({kind, y}) {
   const broken = DATA.constraints.filter((constraint, k) => !limitHolds(constraint, marginOf(y, k)));
   if (!DATA.constraints.length || !kind) return "";
@@ -70,22 +70,22 @@ function limitsInWords({kind, y}) {
   return broken.length ? `violated: ${broken.map((c) => c.name).join(", ")}` : held;
 }
 
-/** Margin of a limit in SI: at least 0 where it holds; of an equality the difference. */
+/** Margin of a limit in SI units, which is at least 0 if the limit holds; for an equality, the difference. */
 function marginOf(y, k) {
   return y[DATA.quantities.length + k];
 }
 
-/** Whether a limit holds, to its tolerance. */
+/** Whether a limit holds within its tolerance. */
 function limitHolds({equality, tolerance}, margin) {
   return equality ? Math.abs(margin) <= tolerance : margin >= -tolerance;
 }
 
-/** Text with powers as ^3 and ^(−2 t), set as such. */
+/** Convert powers in a text, such as ^3 and ^(−2 t), to raised text. */
 function typeset(text) {
   return text.split(/\^(\d+|\(.+?\))/).map((piece, k) => (k % 2 ? element("sup", {}, piece.replace(/[()]/g, "")) : piece));
 }
 
-/** The verdict: class, sentence, abscissa, the known design; returns what draws it and gives its text. */
+/** The verdict: class, sentence, abscissa, known design. Returns a function that draws it and returns its text. */
 function verdictPanel(host) {
   const badge = element("strong", {className: "badge"});
   const sentence = span("sentence");
@@ -100,14 +100,14 @@ function verdictPanel(host) {
     badge.dataset.is = MARKS[word] ?? "✓";
     badge.textContent = `${badge.dataset.is} ${word}`;
     sentence.replaceChildren(...typeset(words));
-    lifts.textContent = liftsOf(y).map((text) => `· ${text}`).join(" ");
-    more.textContent = [abscissa, nearnessOf(known), limitsInWords(drawing)].filter(Boolean).join(" · ");
+    lifts.textContent = liftSentences(y).map((text) => `· ${text}`).join(" ");
+    more.textContent = [abscissa, describeNearest(known), limitsInWords(drawing)].filter(Boolean).join(" · ");
     facts.textContent = known?.proved ? ` · ${factText(known.proved, true)}` : "";
-    return `${word}: ${words}; ${[...liftsOf(y), more.textContent].join("; ")}`;
+    return `${word}: ${words}; ${[...liftSentences(y), more.textContent].join("; ")}`;
   };
 }
 
-/** Limits with their sign and margin; returns what draws them. */
+/** Limits with their sign and margin. Returns a function that draws them. */
 function limitsPanel(host) {
   host.hidden = !DATA.constraints.length && !DATA.others.length;
   const rows = DATA.constraints.map((constraint) => {
@@ -118,7 +118,7 @@ function limitsPanel(host) {
   });
   host.append(element("ul", {className: "limits"}, ...rows.map((r) => r.row)));
   if (DATA.others.length) host.append(element("p", {}, `Not computed on this page: ${DATA.others.join(", ")}.`));
-  if (DATA.nominal) host.append(element("p", {}, "Of bands and tolerances this is the nominal case alone."));
+  if (DATA.nominal) host.append(element("p", {}, "This page shows the nominal case only, without bands and tolerances."));
   return ({y}) => rows.forEach(({constraint, row, sign, words}, k) => {
     const margin = marginOf(y, k);
     const holds = limitHolds(constraint, margin);
@@ -128,7 +128,7 @@ function limitsPanel(host) {
   });
 }
 
-/** A margin in words; that of a share in percent. */
+/** A margin in words; the margin of a share is in percent. */
 function marginInWords({text, equality, tolerance, unit, one}, margin, holds) {
   const share = DATA.quantities.some((q) => q.share && text.split(/[<>=]+/).some((side) => side.trim() === q.name));
   const size = share ? `${figure(100 * Math.abs(margin))} %` : withUnit(Math.abs(margin) / one, unit);
@@ -138,26 +138,26 @@ function marginInWords({text, equality, tolerance, unit, one}, margin, holds) {
   return Number.isFinite(margin) ? `${word} by ${size}` : word;
 }
 
-/** What a rate or time of decay leaves open. */
+/** A remark about a decay rate or decay time, if one is needed. */
 function remarkOf(name, value, drawing) {
   const {times} = slowestOf(drawing);
   if (name === "decay_rate" && value <= 0) return "it does not die out";
   return name === "decay_time" && value < Infinity && times > 1 ? `first it grows: ${OF_H ? "an eigenfrequency of the least loss" : "the rightmost root"} is ${times}-fold` : "";
 }
 
-/** Roots as text, conjugates and multiple ones together. */
+/** A text for each root; conjugate and equal roots share one text. */
 function rootTexts({meetings}) {
   return meetings.map(([re, im, times]) => rootText(re, im) + (times > 1 ? ` (${times}-fold)` : ""));
 }
 
-/** A real root, or a conjugate pair; of a complex system an eigenfrequency. */
+/** Text of a real root or of a conjugate pair; for a complex system, of an eigenfrequency. */
 function rootText(re, im) {
   if (Number.isNaN(re)) return "none";
   if (OF_H) return frequencyText(re, im, 5);
   return im ? `${figure(re, 5)} ± ${figure(Math.abs(im), 5)}i` : figure(re, 5);
 }
 
-/** Roots and quantities; returns what draws them. */
+/** Roots and quantities. Returns a function that draws them. */
 function quantitiesPanel(host) {
   const roots = element("p", {className: "roots"});
   const origin = element("p", {className: "faint"});
@@ -172,7 +172,7 @@ function quantitiesPanel(host) {
     roots.textContent = `${ROOTS}${DATA.rootUnit ? ` in ${DATA.rootUnit}` : ""}: ${rootTexts(drawing).join(", ") || "none"}`;
     origin.hidden = !hasMeeting(drawing.meetings);
     origin.textContent = drawing.known?.roots.length
-      ? `As they were found: where ${ROOTS} meet, computed ones scatter.` : "Those that rounding alone keeps apart are taken for one.";
+      ? `These ${ROOTS} are from the solution: where ${ROOTS} meet, ${ROOTS} computed from the parameters scatter.` : `${ROOTS[0].toUpperCase()}${ROOTS.slice(1)} that differ only by rounding are shown as one.`;
     DATA.quantities.forEach(({name, one, share}, k) => {
       const value = drawing.y[k];
       const never = name === "decay_time" && value === Infinity ? "never" : figure((value / one) * (share ? 100 : 1), 5);
@@ -182,13 +182,13 @@ function quantitiesPanel(host) {
   };
 }
 
-/** A fact for those who have the page only: how to go on, and by which method, is not their matter. */
+/** A fact for readers who have only the page. The method of a proof, and advice on what to do next, are left out. */
 function factText(fact, proved) {
   if (!fact.startsWith("proof: ")) return fact.replace(/(^|[\s(])-(?=\d)/g, "$1−");
   return proved ? fact.replace(/ \(\w+\)/g, "") : "not proved";
 }
 
-/** What was found out before the page was made; returns what marks the design shown. */
+/** The results known before the page was made. Returns a function that marks the design that is shown. */
 function knownPanel(host) {
   if (DATA.objective) host.append(element("p", {}, "asked: ", element("code", {}, DATA.objective)));
   const articles = DATA.designs.map((design) => element("article", {},

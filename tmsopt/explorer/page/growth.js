@@ -1,7 +1,7 @@
-// Growth rates and frequencies over one parameter, with what happens on the way; the root path shares the sweep.
+// Growth rates and frequencies over one parameter, with events. The picture of the roots uses the same sweep.
 
 const SWEEP_POINTS = 301;
-let sweepKept = {key: ""};
+let keptSweep = {key: ""};
 
 /** Coefficients of a design with parameter k at a value. */
 function coefficientsAt(x, k, value) {
@@ -12,7 +12,7 @@ function coefficientsAt(x, k, value) {
   return a;
 }
 
-/** Where a function with few values changes between two ends: [before, after], `width` apart, by bisection. */
+/** Find by bisection where a function with few values changes between two ends: [before, after], `width` apart. */
 function changesBetween(of, low, high, width) {
   const last = of(high);
   const found = [];
@@ -31,14 +31,17 @@ function changesBetween(of, low, high, width) {
   return found;
 }
 
-/** What a change of stability is: `weave`, `capsize` or `infinity`, by which coefficient passes 0; products may underflow. */
+/**
+ * The kind of a change of stability, `weave`, `capsize` or `infinity`. It follows from the coefficient that passes 0.
+ * Signs are compared, because products may underflow.
+ */
 function crossingKind(before, after) {
   if (Math.sign(before[0]) !== Math.sign(after[0])) return "infinity";
   const last = before.length - 1;
   return Math.sign(before[last]) !== Math.sign(after[last]) ? "capsize" : "weave";
 }
 
-/** The roots of a sweep, upper half, joined to curves of pairs and of real roots: {pair, points: [{at, re, im} ..]}. */
+/** Join the roots of a sweep with im ≥ 0 to curves of pairs and of real roots: {pair, points: [{at, re, im} ..]}. */
 function curvesOf(samples) {
   const curves = [];
   let open = [];
@@ -76,13 +79,13 @@ function curvesOf(samples) {
   return curves;
 }
 
-/** How many roots of the polynomial grow, but for those on the imaginary axis as far as can be computed. */
-function growingOf({re, im}) {
+/** Number of roots of the polynomial that grow, without roots on the imaginary axis up to rounding. */
+function countGrowing({re, im}) {
   const sizes = re.map((part, k) => Math.hypot(part, im[k])).sort();
   return re.filter((part) => part > 1e-7 * sizes[re.length >> 1]).length;
 }
 
-/** Runs of one answer along a sweep: [from, to] of samples where `of` holds. */
+/** Intervals [from, to] of a sweep in which `of` is true for all samples. */
 function bandsAlong(samples, of) {
   const bands = [];
   samples.forEach((sample, k) => {
@@ -93,25 +96,25 @@ function bandsAlong(samples, of) {
   return bands;
 }
 
-/** Values ever closer to another on both sides, for there roots move as its root. */
-function closingIn(centre, step, [low, high]) {
+/** Values that approach a centre from both sides. Near an event, roots move like a square root, so steps must shrink. */
+function approachingValues(centre, step, [low, high]) {
   const apart = Array.from({length: 14}, (_, k) => step * 0.5 ** k);
   return apart.flatMap((distance) => [centre - distance, centre + distance]).filter((at) => at > low && at < high);
 }
 
-/** The order of samples and events. */
-const byPlace = (x, y) => x.at - y.at;
+/** Compares samples or events by their value of the parameter. */
+const byValue = (x, y) => x.at - y.at;
 
-/** Whether samples in order miss a window of stability, or a gap in it, that another stands in. */
+/** Whether sorted samples miss a window of stability, or a gap in one, in which another sample lies. */
 function misses(samples, {at, kind}) {
   const next = samples.findIndex((one) => one.at >= at);
   return kind && next > 0 && [next - 1, next].every((k) => samples[k].kind > 2 !== kind > 2);
 }
 
 /**
- * Roots, classes, curves and events over the range of the parameter `state.over`; kept while nothing else moves. Events
- * are in order, {kind, at} in SI; `meeting`: real roots become a pair; `crossing`: roots pass 0, or infinity, unstable
- * before and after.
+ * Roots, classes, curves and events over the range of the parameter `state.over`. The result is kept until another
+ * parameter changes. Events are sorted: {kind, at} in SI units. `meeting`: real roots become a pair; `crossing`: roots
+ * pass 0 or infinity, and the design is unstable before and after.
  */
 function sweepOf(state) {
   const k = state.over;
@@ -120,13 +123,13 @@ function sweepOf(state) {
   const sampleAt = (at) => {
     const a = of(at);
     const roots = rootsOf(a, true);
-    return {at, a, kind: kindOf(a), real: realRootsOf(a), roots, growing: growingOf(roots)};
+    return {at, a, kind: kindOf(a), real: realRootsOf(a), roots, growing: countGrowing(roots)};
   };
   const own = sampleAt(state.x[k]);
-  if (sweepKept.key === key && !misses(sweepKept.coarse, own)) return sweepKept;
+  if (keptSweep.key === key && !misses(keptSweep.coarse, own)) return keptSweep;
   const ends = rangeOf(k);
   const width = 1e-10 * (ends[1] - ends[0]);
-  // a pole between two samples is seen as one, not as two ends of what is undefined
+  // a single undefined sample between two defined samples is a pole, and is left out
   const even = Array.from(evenly(ends, SWEEP_POINTS), sampleAt).filter(
     ({kind}, index, all) => kind || !all[index - 1]?.kind || !all[index + 1]?.kind,
   );
@@ -134,9 +137,9 @@ function sweepOf(state) {
     .filter(({values}) => sameBeside(values, state.x, [k], 0))
     .map((design) => ({...design, at: design.values[k]}));
   const missed = [own, ...known.map(({at}) => sampleAt(at))].filter((one) => misses(even, one));
-  const coarse = [...even, ...missed].sort(byPlace);
+  const coarse = [...even, ...missed].sort(byValue);
   const inside = ({kind, at}) => {
-    // crossings come from computed roots
+    // crossings are found from computed roots, which are less accurate
     const edge = kind === "crossing" ? 1e4 * width : 10 * width;
     const met = kind === "crossing" && known.some((one) => hasMeeting(one.roots) && Math.abs(one.at - at) < edge);
     return !met && at > ends[0] + edge && at < ends[1] - edge;
@@ -149,7 +152,7 @@ function sweepOf(state) {
       const changes = (answer) => changesBetween((at) => answer(of(at)), before.at, sample.at, width);
       const kinds = before.kind === sample.kind ? [] : changes(kindOf);
       const reals = before.real === sample.real ? [] : changes(realRootsOf);
-      const near = [...kinds, ...reals].flat().map(sampleAt).sort(byPlace);
+      const near = [...kinds, ...reals].flat().map(sampleAt).sort(byValue);
       samples.push(...near.filter(({at}) => at > before.at && at < sample.at));
       for (const [low, high] of kinds) {
         const first = sampleAt(low);
@@ -159,7 +162,7 @@ function sweepOf(state) {
         }
       }
       const both = [before, sample].every(({kind}) => kind && kind < 3);
-      const growing = (a) => growingOf(rootsOf(a, true));
+      const growing = (a) => countGrowing(rootsOf(a, true));
       const crossed = both && before.growing !== sample.growing && kinds.length < 2;
       for (const [low, high] of crossed ? changes(growing) : []) {
         const roots = Math.abs(growing(of(high)) - growing(of(low)));
@@ -175,23 +178,23 @@ function sweepOf(state) {
   });
   const step = (ends[1] - ends[0]) / (SWEEP_POINTS - 1);
   const centres = new Set([...events, ...known].map(({at}) => at));
-  samples.push(...[...centres].flatMap((centre) => closingIn(centre, step, ends)).map(sampleAt));
-  samples.sort(byPlace);
-  sweepKept = {
+  samples.push(...[...centres].flatMap((centre) => approachingValues(centre, step, ends)).map(sampleAt));
+  samples.sort(byValue);
+  keptSweep = {
     key,
     ends,
     samples,
     known,
     coarse,
-    events: events.filter(inside).sort(byPlace),
+    events: events.filter(inside).sort(byValue),
     curves: curvesOf(samples),
     stable: bandsAlong(samples, ({kind}) => kind > 2),
     heavy: bandsAlong(samples, ({kind}) => kind === 4),
   };
-  return sweepKept;
+  return keptSweep;
 }
 
-/** Where on the real axis roots meet, between designs with other numbers of real roots; null where one is infinite. */
+/** The point where real roots meet between two designs with different numbers of real roots; null at infinity. */
 function meetingOf(first, second) {
   if (Math.sign(first.a[0]) !== Math.sign(second.a[0])) return null;
   const {re, im} = (first.real > second.real ? first : second).roots;
@@ -211,7 +214,7 @@ function eventWords({kind, at, gains, roots, far}, over) {
   return `${DATA.words[kind]} ${gains ? "ends" : "begins"} ${where}`;
 }
 
-/** Limits of an axis that show most values and 0, with some room. */
+/** Limits of an axis that show most values and 0, with a margin. */
 function limitsOf(values) {
   const sorted = values.filter(Number.isFinite).sort((first, second) => first - second);
   if (!sorted.length) return [-1, 1];
@@ -221,7 +224,7 @@ function limitsOf(values) {
   return [low - room, high + room];
 }
 
-/** Limits of an axis that show all values, with some room. */
+/** Limits of an axis that show all values, with a margin. */
 function limitsOfAll(values) {
   const all = values.filter(Number.isFinite);
   const [low, high] = [Math.min(...all), Math.max(...all)];
@@ -229,7 +232,7 @@ function limitsOfAll(values) {
   return [low - room, high + room];
 }
 
-/** Limits of the growth rates of roots here and near, but for those so far that they would hide what happens at 0. */
+/** Limits of the growth rates of roots at the design and near it, without roots so far away that they would hide 0. */
 function growthLimits(here, near, typical) {
   const sizes = near.filter(Number.isFinite).map(Math.abs).sort((first, second) => first - second);
   const far = 4 * Math.max(typical, sizes[sizes.length >> 1] || 0);
@@ -242,7 +245,7 @@ function growthLimits(here, near, typical) {
   ];
 }
 
-/** Fills of stable and of heavily damped bands, which curves stand out from. */
+/** Fill colours of stable and heavily damped bands, pale enough for curves on top. */
 function bandFills(colours) {
   const fills = classFills(colours);
   return [mixed(fills[3], colours.paper, 0.45), mixed(fills[4], colours.paper, 0.3)];
@@ -256,10 +259,10 @@ function growthPicture(host) {
   const reading = part(host, "p", {class: "reading"});
   const happens = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
-  const says = saysIn(surface.canvas);
+  const says = makeDescriber(surface.canvas);
   surface.canvas.style.touchAction = "pan-y";
 
-  /** 1/s per unit of the roots at a value of the parameter, or 1 without a unit of time. */
+  /** The unit of the roots in 1/s at a value of the parameter, or 1 if the model has no unit of time. */
   function rateAt(state, value) {
     const at = Float64Array.from(state.x);
     at[state.over] = value;
@@ -272,7 +275,7 @@ function growthPicture(host) {
     return [re * rate, (im * rate) / (Number.isFinite(MODEL.rate(now.state.x)) ? 2 * Math.PI : 1)];
   }
 
-  /** Growth rates and frequencies of the curves and of the design, [growth, frequency] in their units, and limits. */
+  /** Growth rates and frequencies of the curves and of the design, [growth, frequency], and the limits of both axes. */
   function motionsOf(state, drawing, sweep) {
     const curves = sweep.curves.map(({pair, points}) => ({
       pair,
@@ -324,7 +327,7 @@ function growthPicture(host) {
   function paint(context, width, height) {
     if (!now) return;
     const {state, drawing} = now;
-    const colours = coloursNow();
+    const colours = currentColours();
     const sweep = sweepOf(state);
     const timed = Number.isFinite(MODEL.rate(state.x));
     const {curves, here, growths, lowest, highest} = motionsOf(state, drawing, sweep);
@@ -334,7 +337,7 @@ function growthPicture(host) {
       plotIn({...box, y0: 36, height: upper}, sweep.ends, growths),
       plotIn({...box, y0: 50 + upper, height: height - 92 - upper}, sweep.ends, [lowest, highest]),
     ];
-    tellPlot(surface.canvas, plots[0]);
+    exposePlot(surface.canvas, plots[0]);
     plots.forEach((plot, lower) => {
       drawBands(context, plot, sweep, colours);
       clipped(context, plot, () => {
@@ -359,7 +362,7 @@ function growthPicture(host) {
     read(state.x[state.over]);
   }
 
-  /** What is so all the way, the events of stability, then where roots meet; of many of these only some. */
+  /** A sentence: the stability if it is the same everywhere, its changes, and some of the values where roots meet. */
   function sentenceOf({ends, events, samples, known}, state, drawing) {
     const over = state.over;
     const {one, unit} = DATA.parameters[over];
@@ -369,7 +372,7 @@ function growthPicture(host) {
     const fates = new Set(samples.filter(({at}) => at > ends[0] + edge && at < ends[1] - edge).map(fate));
     const texts = fates.size > 1 ? [] : [`${[...fates][0]} throughout`];
     texts.push(...events.filter(({kind}) => kind !== "meeting").map((event) => eventWords(event, over)));
-    // several roots meet where no sweep hits them exactly, but where they are known to
+    // no sweep hits exactly the values where several roots meet, so these come from known designs
     const own = {name: "this design", at: state.x[over], roots: drawing.meetings};
     const exact = [...known.filter(({at}) => at !== own.at), own].flatMap(({name, at, roots}) =>
       roots.filter((root) => root[2] > 1 && at >= ends[0] && at <= ends[1]).map((root) => ({name, at, root})),
@@ -404,7 +407,7 @@ function growthPicture(host) {
     else drawDot(context, plot.x(at), plot.y(lower ? 0 : re * rateAt(now.state, at)), 4, colours.paper, colours.ink);
   }
 
-  /** Values of the events above the plot, in two rows where they are close; the design's own always. */
+  /** Write the values of the design and of the events above the plot, in two rows if they are close. */
   function drawNames(context, plot, events, state, colours) {
     const placed = [];
     const place = (text, x, colour) => {
@@ -464,7 +467,7 @@ function growthPicture(host) {
   }
 
   const within = (value) => withinRange(now.state.over, value);
-  movesDesign(
+  addDesignMoves(
     surface.canvas,
     (px) => [[now.state.over, within(plots[0].valueX(px))]],
     (dx, dy) => {

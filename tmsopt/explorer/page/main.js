@@ -1,4 +1,4 @@
-// All together: buttons, redraws gathered in one frame, light and dark, what is said aloud.
+// The whole page: buttons, redrawing once per frame, light and dark colours, texts for screen readers.
 
 const THEMES = ["auto", "dark", "light"];
 const KEYS = [
@@ -11,14 +11,14 @@ const KEYS = [
 
 window.measured = {all: NaN};
 
-/** Pictures in their panels, and what draws them; one that fails says so in its own panel. */
+/** Make the pictures in their panels, and return functions that draw them. An error is shown in its panel. */
 function pictures() {
   const makers = {chart: chartPicture, plane: planePicture, growth: growthPicture, bicycle: bicyclePicture, motion: motionPicture};
   return Object.entries(makers).map(([name, make]) => {
     const panel = by(name);
     const host = panel.appendChild(element("div", {className: "body"}));
     const fault = panel.appendChild(element("p", {className: "message", hidden: true}));
-    const guarded = (task) => {
+    const runGuarded = (task) => {
       try {
         const done = task();
         fault.hidden = true;
@@ -30,16 +30,16 @@ function pictures() {
         return null;
       }
     };
-    const made = guarded(() => make(host));
+    const made = runGuarded(() => make(host));
     return (drawing) => {
       const before = performance.now();
-      if (made) guarded(() => made.draw(state, drawing));
+      if (made) runGuarded(() => made.draw(state, drawing));
       window.measured[name] = performance.now() - before;
     };
   });
 }
 
-/** Draws all that has changed once per frame; what is slow draws coarsely until the slider rests. */
+/** Return a function that draws all panels, once per frame. */
 function redrawer(parts) {
   const drawn = pictures();
   const verdict = verdictPanel(by("verdict"));
@@ -69,12 +69,12 @@ function button(host, text, title, press) {
   return made;
 }
 
-/** A short word about what was done, seen and heard. */
+/** Show a short message about what was done; screen readers read it too. */
 function note(text) {
   by("note").textContent = text;
 }
 
-/** Light or dark: that of the system, or the one chosen; returns what goes to the next choice. */
+/** Set light or dark colours, from the system or as chosen. Returns a function that goes to the next choice. */
 function theme() {
   const dark = matchMedia("(prefers-color-scheme: dark)");
   let chosen = "auto";
@@ -86,7 +86,7 @@ function theme() {
   on(window, "beforeprint", () => {
     apply(true);
     document.querySelectorAll("details").forEach((details) => (details.open = true));
-    // in a frame to come it would be too late
+    // the next frame would be too late
     repaints.forEach((repaint) => repaint());
   });
   on(window, "afterprint", () => apply());
@@ -99,7 +99,7 @@ function theme() {
   };
 }
 
-/** The link of the state to the clipboard; where that is refused, in a field to copy from. */
+/** Copy the link of the state to the clipboard; if the browser refuses this, show the link in a field. */
 async function copyLink() {
   if (location.protocol === "about:") return note("This page has no address here: save the design instead.");
   const address = `${location.href.split("#")[0]}#${fragmentOf(state)}`;
@@ -122,21 +122,21 @@ function openDialog(id, title, ...content) {
   dialog.showModal();
 }
 
-/** Buttons that go to designs; returns what marks the design shown. */
+/** Buttons that go to known designs. Returns a function that marks the design that is shown. */
 function designButtons(host) {
   const made = DATA.designs.map((design) => button(host, design.name, `go to ${design.name}`, () =>
     change({x: [...design.values.entries()]})));
   return ({known}) => made.forEach((b, k) => b.setAttribute("aria-pressed", String(DATA.designs[k] === known)));
 }
 
-/** Buttons of the page; returns what draws them. */
+/** Buttons of the page. Returns a function that draws them. */
 function pageButtons(host, nextTheme) {
-  if (!knownDesign(DATA.start)) button(host, "start", "all as the page opened", () => change({...startingState(), x: [...DATA.start.entries()]}));
+  if (!knownDesign(DATA.start)) button(host, "start", "everything as when the page opened", () => change({...startingState(), x: [...DATA.start.entries()]}));
   const back = button(host, "↶", "undo (Ctrl+Z)", undo);
   const forth = button(host, "↷", "redo (Ctrl+Shift+Z)", redo);
   button(host, "copy link", "a link to this page as it is now", copyLink);
   button(host, "save design", "the design as a problem file for tmsopt solve", save);
-  button(host, "theme: auto", "light, dark, or as the system has it", nextTheme);
+  button(host, "theme: auto", "light, dark, or as in the system", nextTheme);
   button(host, "?", "keys", () => openDialog("keys", "Keys", element("dl", {},
     ...KEYS.flatMap(([key, words]) => [element("dt", {}, key), element("dd", {}, words)]))));
   return () => {
@@ -145,7 +145,7 @@ function pageButtons(host, nextTheme) {
   };
 }
 
-/** Undo and redo by keys, left to a field while its text is being changed. */
+/** Undo and redo by keys. While the user edits a field, the keys act on the text of this field. */
 function listenToKeys() {
   on(document, "keydown", (event) => {
     const key = event.key.toLowerCase();
@@ -159,12 +159,12 @@ function listenToKeys() {
   on(document, "change", ({target}) => delete target.dataset.typed);
 }
 
-/** Says what of a link could not be understood. */
-function saidOfLink(ignored) {
+/** Show the parts of a link that could not be read. */
+function reportIgnored(ignored) {
   if (ignored.length) note(`Ignored in the link: ${ignored.map(decode).join(", ")}`);
 }
 
-/** Builds the page and draws it. */
+/** Build the page and draw it. */
 function start() {
   by("title").textContent = DATA.title || DATA.modelTitle;
   by("about").textContent = DATA.title ? DATA.modelTitle : "";
@@ -178,10 +178,10 @@ function start() {
   const redraw = redrawer(parts);
   watchers.push(redraw);
   listenToKeys();
-  on(window, "hashchange", () => saidOfLink(visit()));
+  on(window, "hashchange", () => reportIgnored(readAddress()));
   const {found, ignored} = stateOf(location.hash.slice(1));
   Object.assign(state, found);
-  saidOfLink(ignored);
+  reportIgnored(ignored);
   redraw(true);
 }
 

@@ -1,24 +1,25 @@
-// What follows a start: the linear response, as curves over time, and the clock that the bicycle moves by.
+// The linear motion after a start, as curves over time, and the clock of the moving bicycle.
 
 const MOTION_POINTS = 601;
 const NO_MOTION = "No motion to show: the equations of this design cannot be solved.";
-const FALLEN = [Math.PI / 6, Math.PI / 2]; // lean and steer of a bicycle that falls: no linear equations there
-// time is that of the file: s, or where there is no unit √(w/g); `from`: the state of a stated system that starts at 1
+const FALLEN = [Math.PI / 6, Math.PI / 2]; // lean and steer at which the bicycle has fallen; linear equations do not hold there
+// `time` is in the unit of the file: s, or √(w/g) without units. `from` is the index of the state that starts at 1, for
+// a system of the user. `watchers` are called when the time changes.
 const clock = {time: 0, playing: false, slower: 1, from: 0, watchers: []};
 let motionKept = {key: ""};
 
-/** Set the clock, in the time of what is shown, and let all who show it draw. */
+/** Set the time of the clock, and draw everything that shows it. */
 function setClock(time) {
   clock.time = time;
   clock.watchers.forEach((watch) => watch());
 }
 
-/** How much of the file's time is played in a second: of a bicycle without units, as if its wheelbase were 1 m. */
+/** Time of the file that is played in a second. A bicycle without units is played as if its wheelbase were 1 m. */
 function clockPace(x) {
   return DATA.bicycle && !Number.isFinite(MODEL.rate(x)) ? Math.sqrt(9.81) : 1;
 }
 
-/** What a time is counted in. */
+/** The unit of time. */
 function timeUnit(x) {
   if (Number.isFinite(MODEL.rate(x))) return "s";
   return DATA.bicycle ? "√(w/g)" : DATA.rootUnit && `1/(${DATA.rootUnit})`;
@@ -30,15 +31,15 @@ function coordinateNames() {
   return Array.from({length: MODEL.size}, (_, k) => `${MODEL.order === 2 ? "coordinate" : "state"} ${k + 1}`);
 }
 
-/** What a motion can start from. */
+/** Names of the states from which a motion can start. */
 function startNames() {
   const names = coordinateNames();
   return MODEL.order === 2 ? [...names, ...names.map((name) => `rate of ${name}`)] : names;
 }
 
 /**
- * {A, n, rate, ride} of z' = A z, n states, and the file's time in that of the model; null where there are no
- * equations. The last states of a bicycle are its yaw and how far the rear contact is to the right.
+ * {A, n, rate, ride} of z' = A z with n states; null if the model has no equations. `rate` converts the time of the file
+ * to the time of the model. The last states of a bicycle are its yaw and the sideways position of the rear contact.
  */
 function systemOf(x) {
   const A = MODEL.pencil && firstOrder(x);
@@ -57,7 +58,7 @@ function systemOf(x) {
   return {A: whole, n, rate, ride};
 }
 
-/** The state after a lean in degrees and an impulse of steer torque, or of other systems one state at 1. */
+/** The first state: after a lean in degrees and an impulse of steer torque, or for other systems with one state at 1. */
 function startIn({n, ride}, {lean, push}) {
   const start = new Float64Array(n);
   if (ride) start.set([(lean * Math.PI) / 180, 0, push * ride[0], push * ride[1]]);
@@ -65,13 +66,13 @@ function startIn({n, ride}, {lean, push}) {
   return start;
 }
 
-/** The row, with its fraction, in which a size comes to a limit; Infinity where it does not. */
-function fallsAt(rows, sizeAt, most) {
+/** The row, with a fraction, in which a size reaches a limit; Infinity if it does not. */
+function findFallRow(rows, sizeAt, most) {
   const row = rows.findIndex((k) => sizeAt(k) >= most);
   return row > 0 ? row - (sizeAt(row) - most) / (sizeAt(row) - sizeAt(row - 1)) : row < 0 ? Infinity : 0;
 }
 
-/** The motion over a length of the model's time, or null; `at(k, time)` is a state, all times are those of the file. */
+/** The motion over a length of the model's time, or null. `at(k, time)` is state k; all other times are in the file's. */
 function motionIn({A, n, rate, ride}, start, length) {
   const times = evenly([0, length], MOTION_POINTS);
   const values = flow(A, n, start, times);
@@ -86,7 +87,7 @@ function motionIn({A, n, rate, ride}, start, length) {
   const size = (row, k) => Math.abs(values[row * n + k]);
   const rows = Array.from(times.keys());
   const peaks = coordinateNames().map((_, k) => rows.reduce((peak, row) => Math.max(peak, size(row, k)), 0));
-  const falls = ride ? FALLEN.map((most, k) => fallsAt(rows, (row) => size(row, k), most)) : [Infinity];
+  const falls = ride ? FALLEN.map((most, k) => findFallRow(rows, (row) => size(row, k), most)) : [Infinity];
   const fall = Math.min(...falls);
   const high = 0.02 * Math.max(...peaks);
   const last = rows.reverse().find((row) => peaks.some((_, k) => size(row, k) > high)) || 1;
@@ -107,8 +108,8 @@ function motionIn({A, n, rate, ride}, start, length) {
   };
 }
 
-/** How long to look at most, in the model's time: until a start has died out or grown large, not for endless swings. */
-function lookLength(drawing, most) {
+/** Longest time to compute, in the model's time: until the motion has died out or grown large, or 20 oscillations. */
+function computeDuration(drawing, most) {
   const [abscissa, , frequency] = drawing.motion;
   const fades = Math.abs(abscissa) > 0 ? (abscissa < 0 ? 16 : 5) / Math.abs(abscissa) : Infinity;
   const swings = frequency > 0 ? (20 * 2 * Math.PI) / frequency : Infinity;
@@ -116,7 +117,7 @@ function lookLength(drawing, most) {
   return Number.isFinite(length) && length > 0 ? length : 10;
 }
 
-/** The motion from the start that is set, until there is nothing more to see or it has fallen; kept until it changes. */
+/** The motion from the current start, until it has died out or the bicycle has fallen; kept until the design changes. */
 function motionFrom(state, drawing) {
   const key = `${clock.from} ${state.lean} ${state.push} ${Array.from(state.x)}`;
   if (motionKept.key === key) return motionKept.found;
@@ -125,9 +126,9 @@ function motionFrom(state, drawing) {
   if (system) {
     const start = startIn(system, state);
     const timed = DATA.bicycle || Number.isFinite(MODEL.rate(state.x));
-    const length = lookLength(drawing, timed ? 20 * clockPace(state.x) * system.rate : Infinity);
+    const length = computeDuration(drawing, timed ? 20 * clockPace(state.x) * system.rate : Infinity);
     found = motionIn(system, start, length);
-    // looked at twice: the second time only as long as there is something to see
+    // computed twice: the second time only until the motion has died out or the bicycle has fallen
     const shorter = found && Math.min(found.reached, drawing.motion[0] < 0 ? 1.1 * found.seen * length : length);
     if (found && shorter < length) found = motionIn(system, start, shorter);
     if (found) found.end = Math.min(found.end, found.falls);
@@ -142,7 +143,7 @@ function fateOf(motion, drawing) {
   return `the motion ${drawing.kind > 2 ? "dies out" : "does not die out"}`;
 }
 
-/** The motion over time; its pointer moves the clock. */
+/** The picture of the motion over time, in which the pointer moves the clock. */
 function motionPicture(host) {
   if (!MODEL.pencil) {
     const panel = host.closest("section") || host;
@@ -165,11 +166,11 @@ function motionPicture(host) {
   const surface = canvasIn(host, (width) => clamp(220, 0.5 * width, 340), paint);
   const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
-  const says = saysIn(surface.canvas);
+  const says = makeDescriber(surface.canvas);
   surface.canvas.style.touchAction = "pan-y";
   clock.watchers.push(() => surface.repaint());
 
-  /** Colour and dash of a coordinate, of the first 25 no two alike. */
+  /** Colour and dash of a coordinate; the first 25 all differ. */
   const lookOf = (k, colours) => [
     [colours.weave, colours.mark, colours.real, colours.complex, colours.ink][k % 5],
     [DASHES.whole, DASHES.long, DASHES.mixed, DASHES.short, DASHES.dots][(k + Math.floor(k / 5)) % 5],
@@ -178,7 +179,7 @@ function motionPicture(host) {
   function paint(context, width, height) {
     if (!now) return;
     const {state, drawing} = now;
-    const colours = coloursNow();
+    const colours = currentColours();
     const motion = motionFrom(state, drawing);
     if (!motion) {
       plot = null;
@@ -196,7 +197,7 @@ function motionPicture(host) {
       [0, motion.end],
       [-size, size],
     );
-    // a motion follows e^(abscissa t) in the end where one root is rightmost, not where some meet there
+    // in the end a motion follows e^(abscissa t), unless the rightmost root is multiple
     const last = rightmostOf(drawing.meetings) - roundingOf(drawing.meetings);
     const lone = drawing.meetings.every(([re, , times]) => times === 1 || re < last);
     const bounded = lone && !isMarginal(drawing.meetings);
@@ -231,7 +232,7 @@ function motionPicture(host) {
     read(motion);
   }
 
-  /** The least multiple of e^(abscissa t) that the curves stay within. */
+  /** Draw the smallest multiple of e^(abscissa t) between whose curves ± the motion stays. */
   function drawEnvelope(context, motion, abscissa, colours) {
     if (!Number.isFinite(abscissa)) return;
     const rows = Array.from(motion.seconds);
@@ -249,7 +250,7 @@ function motionPicture(host) {
     }
   }
 
-  /** What the coordinates are at the time of the clock. */
+  /** Write the coordinates at the time of the clock. */
   function read(motion, time = Math.min(clock.time, motion.end)) {
     const degree = DATA.bicycle ? 180 / Math.PI : 1;
     const values = names.map(
@@ -264,7 +265,7 @@ function motionPicture(host) {
     const motion = motionFrom(now.state, now.drawing);
     if (motion && plot) setClock(clamp(0, plot.valueX(event.offsetX), motion.end));
   };
-  takesKeys(surface.canvas);
+  acceptKeys(surface.canvas);
   surface.canvas.addEventListener("pointerdown", (event) => {
     surface.canvas.setPointerCapture(event.pointerId);
     toTime(event);

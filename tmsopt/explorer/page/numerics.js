@@ -1,8 +1,9 @@
-// Roots, kinds of motion and responses. Coefficients stand in arrays, descending; what is called for every design of a
-// chart fills arrays that are there already, so that nothing is allocated.
+// Roots, classes of stability and motion. Coefficients are in arrays, from the highest power down. Functions that are
+// called for every design of a chart write to existing arrays, so that no memory is allocated.
 
 const IS_QUARTIC = MODEL.degree === 4;
-const GOOD = 4e-15, ACCEPTED = 5e-14; // backward errors: not worth a step, worth another start
+const GOOD = 4e-15; // backward error below which no further step is made
+const ACCEPTED = 5e-14; // backward error above which the search starts again
 
 // ---- powers of two ------------------------------------------------------------------------------
 
@@ -14,7 +15,7 @@ function exponentOf(x) {
   return ((BITS.getUint16(0) >> 4) & 2047) - 1023;
 }
 
-/** x 2^k, without rounding where the result is no tiny number. */
+/** x 2^k, without rounding unless the result is denormal. */
 function scaledBy(x, k) {
   for (; k > 1000; k -= 1000) x *= 2 ** 1000;
   for (; k < -1000; k += 1000) x *= 2 ** -1000;
@@ -23,9 +24,9 @@ function scaledBy(x, k) {
   return x * BITS.getFloat64(0);
 }
 
-// ---- roots: real factors, all improved at once --------------------------------------------------
+// ---- roots: all real factors are improved together ----------------------------------------------
 
-// Factors s² + p s + q, then one s + lone for odd degrees, then so many roots at 0; in units of 2^unit.
+// Factors s² + p s + q, a factor s + lone for odd degrees, and the number of roots at 0, in units of 2^unit.
 const FOUND = {
   p: new Float64Array(6), q: new Float64Array(6), lone: 0, pairs: 0, odd: 0, zeros: 0, unit: 0, error: NaN,
 };
@@ -37,32 +38,32 @@ const START = new Float64Array(9), LATER = new Float64Array(5);
 const LATER_P = new Float64Array(6), LATER_Q = new Float64Array(6);
 const GOLDEN = 0.6180339887498949;
 
-/** Whether a polynomial has roots: finite coefficients and a leading one other than 0. */
+/** Whether a polynomial has roots: its coefficients are finite, and its leading coefficient is not 0. */
 function isRegular(a) {
   for (let k = 0; k < a.length; k++) if (!Number.isFinite(a[k])) return false;
   return a[0] !== 0;
 }
 
-/** Factors a polynomial into FOUND; `quick`: from those that stand there, of one nearby, and in doubles alone. */
+/** Factor a polynomial into FOUND. `quick`: start from the factors in FOUND, of a nearby polynomial; use only doubles. */
 function factor(a, quick) {
   if (!(IS_QUARTIC && a.length === 5 && factorQuartic(a))) factorAny(a, quick);
 }
 
-/** The same for every degree. */
+/** Like `factor`, for every degree. */
 function factorAny(a, quick) {
-  const n = inUnit(a), near = quick && FOUND.pairs === n >> 1 && FOUND.odd === (n & 1) && FOUND.error <= ACCEPTED;
+  const n = makeMonic(a), near = quick && FOUND.pairs === n >> 1 && FOUND.odd === (n & 1) && FOUND.error <= ACCEPTED;
   FOUND.pairs = n >> 1;
   FOUND.odd = n & 1;
   FOUND.error = Infinity;
-  if (near) improve(n, 9);
+  if (near) improveFactors(n, 9);
   if (FOUND.error > ACCEPTED) {
     startFactors(n);
-    improve(n, 40);
+    improveFactors(n, 40);
   }
-  if (!quick && FOUND.error > ACCEPTED) refine(n);
+  if (!quick && FOUND.error > ACCEPTED) refineRoots(n);
 }
 
-/** The closed form and a few steps of Newton's method; false where they do not give the coefficients back. */
+/** Factor by the closed form and a few steps of Newton's method; false if the factors do not reproduce the polynomial. */
 function factorQuartic(a) {
   quarticStart(a[0], a[1], a[2], a[3], a[4], START);
   let error = START[8];
@@ -83,27 +84,27 @@ function factorQuartic(a) {
   return true;
 }
 
-/** Monic coefficients without roots at 0, in a unit near the mean size of the roots; returns the degree left. */
-function inUnit(a) {
+/** Make the polynomial monic, without roots at 0, in a unit near the mean size of the roots; return its degree. */
+function makeMonic(a) {
   let n = a.length - 1;
   while (a[n] === 0) n--;
   FOUND.zeros = a.length - 1 - n;
   const e = exponentOf(a[0]), lead = scaledBy(a[0], -e);
   const unit = n ? Math.round((Math.log2(Math.abs(a[n])) - Math.log2(Math.abs(a[0]))) / n) : 0;
   for (let k = 0; k <= n; k++) MONIC[k] = scaledBy(a[k], -e - k * unit) / lead;
-  if (unit !== FOUND.unit) FOUND.error = Infinity; // what stands there is in another unit
+  if (unit !== FOUND.unit) FOUND.error = Infinity; // the factors in FOUND have another unit
   FOUND.unit = unit;
   return n;
 }
 
-/** Copies factors. */
-function remember(from, to) {
+/** Copy factors. */
+function copyFactors(from, to) {
   to.p.set(from.p);
   to.q.set(from.q);
   to.lone = from.lone;
 }
 
-/** Factors from roots that repel one another (Ehrlich and Aberth), which start on circles of Newton's polygon. */
+/** Find factors by the method of Ehrlich and Aberth: roots start on the circles of Newton's polygon, and repel each other. */
 function startFactors(n) {
   for (let i = 0, next; i < n; i = next) {
     let steepest = -Infinity;
@@ -122,13 +123,13 @@ function startFactors(n) {
   }
   let moving = (1 << n) - 1;
   for (let round = 0; moving && round < 80; round++) {
-    for (let k = 0; k < n; k++) if ((moving >> k) & 1 && !repelled(n, k)) moving &= ~(1 << k);
+    for (let k = 0; k < n; k++) if ((moving >> k) & 1 && !moveRoot(n, k)) moving &= ~(1 << k);
   }
-  pairUp(n);
+  pairRoots(n);
 }
 
-/** Moves root k; false where its value is all rounding. */
-function repelled(n, k) {
+/** Move root k by one step; false if the value of the polynomial there is only rounding. */
+function moveRoot(n, k) {
   const x = RE[k], y = IM[k], modulus = Math.hypot(x, y);
   let u = 0, v = 0, du = 0, dv = 0, size = 0;
   for (let i = 0; i <= n; i++) {
@@ -153,8 +154,8 @@ function repelled(n, k) {
   return true;
 }
 
-/** Conjugates, and then neighbours on the real axis, into factors. */
-function pairUp(n) {
+/** Combine conjugate roots, and then neighbouring real roots, into factors. */
+function pairRoots(n) {
   const left = [...Array(n).keys()].sort((i, j) => Math.abs(IM[j]) - Math.abs(IM[i])), real = [];
   let pairs = 0;
   while (left.length) {
@@ -177,24 +178,24 @@ function pairUp(n) {
   }
 }
 
-/** Steps while they help; leaves in FOUND the best factors that were met, and their error. */
-function improve(n, steps) {
+/** Make steps while they help; leave the best factors and their error in FOUND. */
+function improveFactors(n, steps) {
   let worse = 0;
   for (let k = 0; ; k++) {
-    const error = rebuild(n);
+    const error = multiplyFactors(n);
     if (error < FOUND.error) {
       FOUND.error = error;
-      remember(FOUND, BEST);
+      copyFactors(FOUND, BEST);
       worse = 0;
     } else worse++;
     if (error <= GOOD || k === steps || !(error < Infinity) || (FOUND.error < 1e-9 && worse > 4)) break;
-    correct(n);
+    correctFactors(n);
   }
-  if (FOUND.error < Infinity) remember(BEST, FOUND);
+  if (FOUND.error < Infinity) copyFactors(BEST, FOUND);
 }
 
-/** What the factors give back into REBUILT; returns the largest error of it relative to the terms it is summed from. */
-function rebuild(n) {
+/** Multiply the factors into REBUILT; return its largest error, relative to the terms of its sums. */
+function multiplyFactors(n) {
   const { p, q, pairs } = FOUND;
   REBUILT.fill(0);
   TERMS.fill(0);
@@ -222,8 +223,11 @@ function rebuild(n) {
   return error;
 }
 
-/** A step of Newton's method on all factors at once: each solves (change) × (product of the others) ≡ what is left. */
-function correct(n) {
+/**
+ * A step of Newton's method on all factors at once. The change of a factor solves (change) × (product of the other
+ * factors) ≡ (remainder), modulo the factor.
+ */
+function correctFactors(n) {
   const { p, q, pairs, lone } = FOUND;
   let slope = 0, value = 1;
   if (FOUND.odd) {
@@ -258,11 +262,11 @@ function correct(n) {
   if (FOUND.odd) FOUND.lone += step;
 }
 
-/** The same repulsion with 320 binary places, where roots meet and the last digits of doubles are all rounding. */
-function refine(n) {
+/** The method of `startFactors` with 320 binary digits, for roots that meet, where doubles have too few digits. */
+function refineRoots(n) {
   const one = 1n << 320n, tiny = 1n << 240n;
   const fixed = (x) => {
-    const [mantissa, exponent] = wholeOf(x), shift = exponent + 320;
+    const [mantissa, exponent] = toInteger(x), shift = exponent + 320;
     return shift < 0 ? mantissa >> BigInt(-shift) : mantissa << BigInt(shift);
   };
   const monic = Array.from(MONIC.subarray(0, n + 1), fixed);
@@ -291,27 +295,27 @@ function refine(n) {
     }
   }
   for (let k = 0; k < n; k++) [RE[k], IM[k]] = [scaledBy(Number(re[k]), -320), scaledBy(Number(im[k]), -320)];
-  pairUp(n);
-  improve(n, 0);
+  pairRoots(n);
+  improveFactors(n, 0);
 }
 
-// ---- signs: exact where rounding could change one -----------------------------------------------
+// ---- signs: computed exactly if rounding could change them --------------------------------------
 
 /** A double as an integer times a power of two. */
-function wholeOf(x) {
+function toInteger(x) {
   BITS.setFloat64(0, x);
   const bits = BITS.getBigUint64(0), exponent = Number((bits >> 52n) & 2047n), fraction = bits & 0xfffffffffffffn;
   const mantissa = exponent ? fraction | 0x10000000000000n : fraction;
   return [x < 0 ? -mantissa : mantissa, Math.max(exponent, 1) - 1075];
 }
 
-// Of negative and positive real roots, each once; and sign changes of a chain at −∞, 0 and ∞.
+// Numbers of different negative and positive real roots; sign changes of Sturm's chain at −∞, 0 and ∞.
 const COUNT = { negative: 0, positive: 0 }, CHANGES = { left: 0, middle: 0, right: 0 };
 const CHAIN = [0, 1, 2].map(() => ({ value: new Float64Array(13), error: new Float64Array(13) }));
-const UNIT = 2 ** -51; // four times the rounding of an operation, which pays for that of the bounds
+const UNIT = 2 ** -51; // four times the rounding error of an operation, to include the rounding of the bounds
 const HALVED = Array.from({ length: 13 }, (_, n) => new Float64Array(n + 1));
 
-/** Class code: 0 undefined, 1 capsize, 2 weave, 3 stable, 4 heavily damped; by signs alone. */
+/** Class code: 0 undefined, 1 capsize, 2 weave, 3 stable, 4 heavily damped. It follows from signs only. */
 function kindOf(a) {
   if (!isRegular(a)) return 0;
   if (IS_QUARTIC) {
@@ -324,7 +328,7 @@ function kindOf(a) {
   return COUNT.positive > 0 || a[n] === 0 ? 1 : 2;
 }
 
-/** Number of different real roots, by signs alone; 0 where there are no roots. */
+/** Number of different real roots, from signs only; 0 if there are no roots. */
 function realRootsOf(a) {
   if (!isRegular(a)) return 0;
   if (IS_QUARTIC) {
@@ -335,7 +339,7 @@ function realRootsOf(a) {
   return COUNT.negative + COUNT.positive + (a[a.length - 1] === 0 ? 1 : 0);
 }
 
-/** Whether all real parts are negative: up to degree 4 by the rounded conditions, as in the package, above exactly. */
+/** Whether all real parts are negative. Up to degree 4 the conditions are rounded, as in the package; above they are exact. */
 function isStable(a) {
   if (a.length <= 5) return stableBySigns(a[0], a[1], a[2], a[3], a[4]);
   const n = a.length - 1, up = a[0] > 0, f = CHAIN[0], g = CHAIN[1];
@@ -346,16 +350,16 @@ function isStable(a) {
   g.value.fill(0);
   for (let k = 0; k <= n; k++) (k & 1 ? g : f).value[k - (k & 1)] = k & 2 ? -a[k] : a[k];
   if (!signChanges(n)) {
-    const whole = wholes(a).map((x, k) => (k & 2 ? -x : x));
+    const whole = toIntegers(a).map((x, k) => (k & 2 ? -x : x));
     exactSignChanges(whole.map((x, k) => (k & 1 ? 0n : x)), whole.slice(1).map((x, k) => (k & 1 ? 0n : x)));
   }
   return CHANGES.left - CHANGES.right === n;
 }
 
 /**
- * Counts the real roots other than 0 by Descartes' rule, by Sturm's chain, by discs around computed roots, and in whole
- * numbers where none of these tells.
- * `enough`: asked is only whether so many are negative, or for 1 whether any is positive; 0 for the numbers themselves.
+ * Count the real roots other than 0: by Descartes' rule, by Sturm's chain, by discs around computed roots, or, if none of
+ * these decides, with integers.
+ * `enough`: 0 counts all; 1 asks only if a root is positive; a larger number asks only if so many roots are negative.
  */
 function countReal(a, enough) {
   let n = a.length - 1;
@@ -392,14 +396,14 @@ function countReal(a, enough) {
   }
   if (signChanges(n) < 2) {
     if (discs(a)) return;
-    const whole = wholes(a.slice(0, n + 1));
+    const whole = toIntegers(a.slice(0, n + 1));
     exactSignChanges(whole, whole.slice(0, n).map((x, k) => x * BigInt(n - k)));
   }
   COUNT.negative = CHANGES.left - CHANGES.middle;
   COUNT.positive = CHANGES.middle - CHANGES.right;
 }
 
-/** Whether roots are certainly not all real: Newton's inequalities between neighbouring coefficients. */
+/** Whether some roots are certainly not real, by Newton's inequalities between neighbouring coefficients. */
 function hasPair(a, n) {
   for (let k = 1; k < n; k++) {
     const most = a[k] * a[k] * (k * (n - k)), least = a[k - 1] * a[k + 1] * ((k + 1) * (n - k + 1));
@@ -410,7 +414,7 @@ function hasPair(a, n) {
 
 /**
  * Sign changes along the chain of remainders of two polynomials of degrees n and n − 1, with bounds of all rounding.
- * Returns 0 where a sign is in doubt, 1 where those at 0 alone may be, else 2.
+ * Returns 2 if all signs are certain, 1 if only signs at 0 are uncertain, otherwise 0.
  */
 function signChanges(n) {
   let p = CHAIN[0], q = CHAIN[1], r = CHAIN[2], certain = 2;
@@ -443,13 +447,13 @@ function signChanges(n) {
     const down = largest > 0 && largest < Infinity ? scaledBy(1, -exponentOf(largest)) : 1;
     for (let i = 0; i < d - 1; i++) {
       R[i] *= down;
-      F[i] = F[i] * down + 1e-300; // what underflows
+      F[i] = F[i] * down + 1e-300; // bound of underflow
     }
     [p, q, r] = [q, r, p];
   }
 }
 
-/** Counts roots by discs that hold one root each; false where they touch one another, 0 or both sides of the axis. */
+/** Count real roots by discs with one root each; false if discs touch each other or 0, or contain non-real points only. */
 function discs(a) {
   factorAny(a, true);
   const n = 2 * FOUND.pairs + FOUND.odd;
@@ -469,7 +473,7 @@ function discs(a) {
       size = size * modulus + Math.abs(MONIC[i]);
     }
     for (let j = 0; j < n; j++) if (j !== k) others *= Math.hypot(x - RE[j], y - IM[j]);
-    const rounding = 8 * n * 2 ** -52 * size; // of Horner's rule, with room
+    const rounding = 8 * n * 2 ** -52 * size; // bound of the rounding of Horner's rule, with a margin
     RADIUS[k] = (1.001 * n * (Math.hypot(u, v) + rounding)) / others;
     if (!((y === 0 ? Math.abs(x) : Math.abs(y)) > RADIUS[k])) return false;
     for (let j = 0; j < k; j++) {
@@ -481,13 +485,13 @@ function discs(a) {
   return true;
 }
 
-/** Coefficients as whole numbers, all times the same power of two. */
-function wholes(a) {
-  const parts = Array.from(a, wholeOf), least = Math.min(...parts.map(([m, e]) => (m ? e : Infinity)));
+/** Coefficients as integers, all multiplied by the same power of two. */
+function toIntegers(a) {
+  const parts = Array.from(a, toInteger), least = Math.min(...parts.map(([m, e]) => (m ? e : Infinity)));
   return parts.map(([m, e]) => (m ? m << BigInt(e - least) : 0n));
 }
 
-/** The same sign changes, exactly; degrees may fall by more than one, and the chain may end early. */
+/** Like `signChanges`, but exact. Degrees may fall by more than one, and the chain may end early. */
 function exactSignChanges(p, q) {
   const sign = (x) => (x > 0n ? 1 : x < 0n ? -1 : 0), size = (x) => (x < 0n ? -x : x);
   const ends = [[], [], []];
@@ -496,7 +500,7 @@ function exactSignChanges(p, q) {
     const lead = sign(p[0]);
     [p.length & 1 ? lead : -lead, sign(p[p.length - 1]), lead].forEach((s, k) => s && ends[k].push(s));
     if (!q.length) break;
-    // −(p mod q) times a positive number, over what the step before has brought in (Collins).
+    // −(p mod q) times a positive number, divided by the factor of the step before (Collins).
     const factor = size(q[0]), toward = q[0] > 0n ? 1n : -1n;
     let rest = p, multiplier = 1n;
     while (rest.length >= q.length) {
@@ -512,11 +516,11 @@ function exactSignChanges(p, q) {
   [CHANGES.left, CHANGES.middle, CHANGES.right] = turns;
 }
 
-// ---- what is asked of a design ------------------------------------------------------------------
+// ---- roots and motion of a design ---------------------------------------------------------------
 
 /**
- * All roots, rightmost first, conjugates exact and side by side, and the error of the coefficients they give back;
- * `quick` as of `factor`.
+ * All roots, rightmost first, with exact conjugates next to each other, and the error of the coefficients that they
+ * reproduce. `quick` is explained at `factor`.
  */
 function rootsOf(a, quick) {
   const n = a.length - 1, re = new Float64Array(n).fill(NaN), im = new Float64Array(n).fill(NaN);
@@ -529,7 +533,7 @@ function rootsOf(a, quick) {
   }
   if (FOUND.odd) found.push([-FOUND.lone, 0]);
   for (let k = 0; k < FOUND.zeros; k++) found.push([0, 0]);
-  found.sort((u, v) => v[0] - u[0] || Math.abs(v[1]) - Math.abs(u[1])); // stable: conjugates stay together
+  found.sort((u, v) => v[0] - u[0] || Math.abs(v[1]) - Math.abs(u[1])); // the sort is stable, so conjugates stay together
   found.forEach(([x, y], k) => {
     re[k] = scaledBy(x, FOUND.unit);
     im[k] = scaledBy(y, FOUND.unit);
@@ -537,7 +541,7 @@ function rootsOf(a, quick) {
   return { re, im, error: FOUND.error };
 }
 
-/** Real coefficients of the monic polynomial with roots x + i y, conjugates among them. */
+/** Real coefficients of the monic polynomial with roots x + i y, which include the conjugates. */
 function expanded(x, y) {
   const re = new Float64Array(x.length + 1), im = new Float64Array(x.length + 1);
   re[0] = 1;
@@ -551,8 +555,9 @@ function expanded(x, y) {
 }
 
 /**
- * Roots as [re, im, multiplicity], those with im ≥ 0, rightmost first. Roots are joined greedily, the nearest first; of
- * these groups the last whose means change no coefficient by more than 1e-11 of its terms are taken for one root each.
+ * Roots with im ≥ 0 as [re, im, multiplicity], rightmost first. Roots are joined to groups one after the other, beginning
+ * with the nearest. The last groups whose means change no coefficient by more than 1e-11 of its terms become one root
+ * each.
  */
 function meetingsOf({ re, im }) {
   const n = re.length, all = [...re.keys()], unit = Math.max(...all.map((k) => Math.hypot(re[k], im[k]))) || 1;
@@ -570,7 +575,7 @@ function meetingsOf({ re, im }) {
   pairs.forEach(([distance, i, j], place) => {
     const [from, into] = [group[j], group[i]];
     all.forEach((k) => (group[k] = group[k] === from ? into : group[k]));
-    if (place + 1 < pairs.length && pairs[place + 1][0] <= distance * (1 + 1e-9)) return; // the conjugates first
+    if (place + 1 < pairs.length && pairs[place + 1][0] <= distance * (1 + 1e-9)) return; // the conjugates must be joined first
     const met = expanded(all.map((k) => mean(x, k)), all.map((k) => mean(y, k)));
     if (met.every((c, k) => Math.abs(c - whole[k]) <= 1e-11 * terms[k])) best = group.slice();
   });
@@ -583,7 +588,7 @@ function meetingsOf({ re, im }) {
   return found.filter((z) => z[1] >= 0).sort((u, v) => v[0] - u[0] || v[1] - u[1]);
 }
 
-/** Abscissa, damping ratio and angular frequency into `out`; NaN where there are no roots. */
+/** Write abscissa, damping ratio and angular frequency to `out`; NaN if there are no roots. */
 function motionOf(a, out, quick = false) {
   out[0] = out[1] = out[2] = NaN;
   if (!isRegular(a)) return;
@@ -605,8 +610,8 @@ function motionOf(a, out, quick = false) {
 }
 
 /**
- * Designs with parameter i from xs and j from ys, row by row, those of one ys side by side: their kinds, and, where
- * `want` names them, "abscissa" and "damping".
+ * Classes of the designs with parameter i from xs and parameter j from ys. A row of the result has one value of ys. With
+ * "abscissa" or "damping" in `want`, the result also has these numbers.
  */
 function survey(x, i, j, xs, ys, want) {
   const design = Float64Array.from(x), a = new Float64Array(MODEL.degree + 1), out = new Float64Array(3);
@@ -619,7 +624,7 @@ function survey(x, i, j, xs, ys, want) {
   for (let row = 0; row < ys.length; row++) {
     design[j] = ys[row];
     for (let place = 0; place < xs.length; place++) {
-      const column = row & 1 ? xs.length - 1 - place : place, k = row * xs.length + column; // to and fro: always near
+      const column = row & 1 ? xs.length - 1 - place : place, k = row * xs.length + column; // back and forth, so that neighbours are near
       design[i] = xs[column];
       MODEL.coefficients(design, a);
       found.kind[k] = kindOf(a);
@@ -632,9 +637,9 @@ function survey(x, i, j, xs, ys, want) {
   return found;
 }
 
-// ---- responses ----------------------------------------------------------------------------------
+// ---- motion over time ---------------------------------------------------------------------------
 
-/** Product of square matrices of n rows, row by row. */
+/** Product of square matrices with n rows, stored row by row. */
 function matrixProduct(A, B, n) {
   const C = new Float64Array(n * n);
   for (let i = 0; i < n; i++)
@@ -642,7 +647,7 @@ function matrixProduct(A, B, n) {
   return C;
 }
 
-/** Exponential of a square matrix: Taylor's series of a 2^-k-th of it, squared k times. */
+/** Exponential of a square matrix A: the Taylor series of 2^-k A, squared k times. */
 function exponential(A, n) {
   let norm = 0;
   for (let i = 0; i < n; i++) {
@@ -651,7 +656,7 @@ function exponential(A, n) {
   const halvings = norm < Infinity ? Math.max(0, exponentOf(norm) + 3) : 0;
   const part = A.map((x) => scaledBy(x, -halvings));
   let term = Float64Array.from(A, (_, k) => (k % (n + 1) ? 0 : 1)), sum = term.slice();
-  for (let k = 1; k <= 14; k++) { // 4^-15/15! is nothing
+  for (let k = 1; k <= 14; k++) { // 4^-15/15! is negligible
     term = matrixProduct(term, part, n).map((x) => x / k);
     sum = sum.map((x, i) => x + term[i]);
   }
@@ -659,20 +664,20 @@ function exponential(A, n) {
   return sum;
 }
 
-/** The matrix A of z' = A z of the pencil at a design, or null where the leading matrix is singular. */
+/** The matrix A of z' = A z from the matrices of a design, or null if the leading matrix is singular. */
 function firstOrder(x) {
   const n = MODEL.size, entries = new Float64Array(n * n * (MODEL.order + 1));
   MODEL.pencil(x, entries);
   const width = n * (MODEL.order + 1), rows = [];
   for (let i = 0; i < n; i++) {
-    // M | K, D or I | A: the unknowns in the order of the state.
+    // M | K, D, or I | A; the unknowns are in the order of the state.
     const row = new Float64Array(width);
     for (let j = 0; j < n; j++) {
       row[j] = entries[i * n + j];
       for (let k = 1; k <= MODEL.order; k++) row[(MODEL.order + 1 - k) * n + j] = -entries[(k * n + i) * n + j];
     }
     const size = exponentOf(Math.max(...row.subarray(0, n).map(Math.abs)));
-    rows.push(row.map((x) => scaledBy(x, -size))); // a mass may be tiny beside another
+    rows.push(row.map((x) => scaledBy(x, -size))); // a mass may be tiny compared with another
   }
   for (let c = 0; c < n; c++) {
     const best = rows.slice(c).reduce((most, row, k) => (Math.abs(row[c]) > Math.abs(rows[most][c]) ? c + k : most), c);
@@ -691,7 +696,7 @@ function firstOrder(x) {
   return A.every(Number.isFinite) ? A : null;
 }
 
-/** States of z' = A z, with n of them, at ascending times from a start at time 0, time by time. */
+/** The n states of z' = A z at ascending times, from a start at time 0. */
 function flow(A, n, start, times) {
   const found = new Float64Array(times.length * n);
   let state = Float64Array.from(start), time = 0, step = NaN, over = null;
@@ -712,7 +717,7 @@ function flow(A, n, start, times) {
   return found;
 }
 
-/** The flow of the pencil's system, displacements and then velocities; null where `firstOrder` is, or without matrices. */
+/** The motion of the model's matrices, displacements and then velocities; null if there is no `firstOrder`. */
 function response(x, start, times) {
   const A = MODEL.pencil && firstOrder(x);
   return A ? flow(A, MODEL.size * MODEL.order, start, times) : null;

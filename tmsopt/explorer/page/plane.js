@@ -1,12 +1,12 @@
-// The roots in the complex plane, and the path that they take over one parameter.
+// The roots in the complex plane, and their path over one parameter.
 
-/** Limits of the plane that keep the current roots in sight: kept while they serve, for a picture that stands still. */
+/** Limits of the plane that show the current roots. They change only if necessary, so that the picture stands still. */
 function planeReach(roots, path, kept) {
   const middle = typicalSize(roots, ([re, im]) => Math.hypot(re, im)) || Infinity;
   const seen = roots.filter(([re, im]) => Math.hypot(re, im) <= 10 * middle);
   const least = 1e-6 * Math.max(1e-300, ...path.map(({re, im}) => Math.hypot(re, im)));
   const own = Math.max(...seen.map(([re, im]) => Math.hypot(re, im)));
-  const size = own > least ? own : 1e6 * least; // where all roots are 0 the path says how large the picture is
+  const size = own > least ? own : 1e6 * least; // if all roots are 0, the path determines the size
   const near = path.filter(({re, im}) => Math.hypot(re, im) < 1.6 * size);
   const points = [...seen.map(([re, im]) => ({re, im})), ...near];
   const need = {
@@ -35,9 +35,9 @@ function planePicture(host) {
   const surface = canvasIn(host, (width) => clamp(300, 0.8 * width, 520), paint);
   const reading = part(host, "p", {class: "reading"});
   const legend = legendIn(host);
-  const says = saysIn(surface.canvas);
+  const says = makeDescriber(surface.canvas);
 
-  /** Equal scales along both axes: the angle of a root is its damping. Of H the middle frequency is halfway up. */
+  /** Equal scales on both axes, so that angles show damping. For a complex H the mean frequency is at half height. */
   function plotOf(width, height, {left, right, top}, middle) {
     const box = {x0: PLOT_LEFT, y0: 8, width: width - PLOT_LEFT - 12, height: height - 50};
     const scale = Math.max((right - left) / box.width, (2 * top) / box.height);
@@ -48,7 +48,7 @@ function planePicture(host) {
   function paint(context, width, height) {
     if (!now) return;
     const {state, drawing} = now;
-    const colours = coloursNow();
+    const colours = currentColours();
     const roots = drawing.meetings;
     const sweep = sweepOf(state);
     const value = state.x[state.over];
@@ -83,20 +83,20 @@ function planePicture(host) {
     describe(state, roots, colours);
   }
 
-  /** The path: dotted at lower values, whole at higher ones, both fading with the distance from the design's own. */
+  /** Draw the path: dotted at lower values and solid at higher values; it fades with the distance from the design. */
   function drawPath(context, plot, sweep, value, colours) {
     const span = sweep.ends[1] - sweep.ends[0];
     const shade = (at) => 0.18 + 0.82 * Math.max(0, 1 - Math.abs(at - value) / (0.45 * span));
     for (const side of OF_H ? [1] : [1, -1]) {
       for (const {points} of sweep.curves) {
         const at = ({re, im}) => ({x: plot.x(re), y: plot.y(side * im)});
-        let gone = 0;
+        let dashOffset = 0;
         points.slice(1).forEach((point, k) => {
           const ends = [at(points[k]), at(point)];
           context.globalAlpha = shade(point.at);
           if (points[k].at >= value) drawLine(context, ends, colours.real, 2.4);
-          else drawLine(context, ends, colours.complex, 3.2, DASHES.dots, gone);
-          gone += Math.hypot(ends[1].x - ends[0].x, ends[1].y - ends[0].y);
+          else drawLine(context, ends, colours.complex, 3.2, DASHES.dots, dashOffset);
+          dashOffset += Math.hypot(ends[1].x - ends[0].x, ends[1].y - ends[0].y);
         });
       }
     }

@@ -1,10 +1,10 @@
-// The state: what the page shows now, how it changes, and how it is kept in steps, in a link and in a file.
+// The state: what the page shows now, how it changes, and how it is stored for undo, in a link and in a file.
 
-// degrees, and an impulse in DATA.impulseUnit: what the bicycle starts with
+// start of the bicycle: a lean in degrees, and an impulse in DATA.impulseUnit
 const STARTS = {lean: 5, push: 0};
 // whether roots are eigenfrequencies of a complex H: [Im ω, Re ω, multiplicity], without conjugates
 const OF_H = DATA.carrier !== null;
-// what the greatest growth rate, the roots and the line between decay and growth are called
+// names of the largest growth rate, of the roots, and of the line between decay and growth
 const [ABSCISSA, ROOTS, AXIS] = OF_H
   ? ["largest Im ω", "eigenfrequencies", "the real axis"]
   : ["abscissa", "roots", "the imaginary axis"];
@@ -13,7 +13,7 @@ const state = startingState();
 const steps = {past: [], future: [], before: null};
 const watchers = [];
 
-/** A new element with properties, or attributes where it has no such property; children are elements or text. */
+/** A new element with properties (or attributes, if it has no such property) and children, which are elements or text. */
 function element(tag, given = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(given)) {
@@ -24,7 +24,7 @@ function element(tag, given = {}, ...children) {
   return made;
 }
 
-/** The element of the page by its id. */
+/** The element of the page with an id. */
 function by(id) {
   return document.getElementById(id);
 }
@@ -39,14 +39,14 @@ function on(target, type, listener) {
   target.addEventListener(type, listener);
 }
 
-/** A value and its unit to read. */
+/** Text of a value with its unit. */
 function withUnit(value, unit, digits = 5) {
   return unit && Number.isFinite(value) ? `${figure(value, digits)} ${unit}` : figure(value, digits);
 }
 
 /**
- * The one way to change the state: x as pairs of index and value in SI, plane, over, layer, lean, push. While something is
- * dragged, settle is false: all until the next settled change is one step of undo.
+ * Change the state; nothing else changes it. `wanted` has x (pairs of index and value in SI units), plane, over, layer,
+ * lean, push. While something is dragged, `settle` is false; all changes until the next settled one are one step of undo.
  */
 function change(wanted, settle = true) {
   steps.before ??= fragmentOf(state);
@@ -58,28 +58,28 @@ function change(wanted, settle = true) {
       steps.future = [];
     }
     steps.before = null;
-    keepInAddress();
+    writeAddress();
   }
   watchers.forEach((watch) => watch(settle));
 }
 
-/** One step: from the steps on one side of now, to those on the other. */
+/** Take one step from one list of steps (past or future), and put the current state on the other list. */
 function stepBetween(from, to) {
-  // what is being dragged ends here
+  // a drag ends here
   change({});
   if (!from.length) return;
   to.push(fragmentOf(state));
   Object.assign(state, stateOf(from.pop()).found);
-  keepInAddress();
+  writeAddress();
   watchers.forEach((watch) => watch(true));
 }
 
-/** Take back the last change. */
+/** Undo the last change. */
 function undo() {
   stepBetween(steps.past, steps.future);
 }
 
-/** Do again what was taken back. */
+/** Redo the last change that was undone. */
 function redo() {
   stepBetween(steps.future, steps.past);
 }
@@ -89,7 +89,7 @@ function startingState() {
   return {x: Float64Array.from(DATA.start), plane: [...DATA.plane], over: DATA.over, layer: "kind", ...STARTS};
 }
 
-/** All that differs from the start as the fragment of a link; its numbers come back bit for bit. */
+/** All differences from the starting state, as the fragment of a link. Its numbers are exact. */
 function fragmentOf({x, plane, over, layer, ...rest}) {
   const name = (k) => encodeURIComponent(DATA.parameters[k].name);
   const parts = [...x].flatMap((value, k) => (value === DATA.start[k] ? [] : [`${name(k)}=${value}`]));
@@ -100,14 +100,14 @@ function fragmentOf({x, plane, over, layer, ...rest}) {
   return parts.join("&");
 }
 
-/** The state that a fragment writes down, and those of its parts that say nothing here. */
+/** The state in a fragment (`found`), and the parts of the fragment that could not be read (`ignored`). */
 function stateOf(fragment) {
   const [found, ignored] = [startingState(), []];
   for (const part of fragment.split("&").filter(Boolean)) if (!takePart(found, part)) ignored.push(part);
   return {found, ignored};
 }
 
-/** One part of a fragment into a state; whether it could be taken. */
+/** Write one part of a fragment to a state; return whether it could be read. */
 function takePart(found, part) {
   const [key, ...rest] = part.split("=");
   const indexOf = (text) => DATA.parameters.findIndex((p) => p.name === decode(text));
@@ -135,12 +135,12 @@ function takePart(found, part) {
   return true;
 }
 
-/** Whether the bicycle can start with so much: a lean from which it has not fallen yet, any push. */
+/** Whether the bicycle can start with a value: with a lean below 30°, or with any push. */
 function isStart(name, value) {
   return Number.isFinite(value) && (name !== "lean" || Math.abs(value) < 30);
 }
 
-/** A part of a link in plain letters; itself where it is not well written. */
+/** Decode a part of a link; a part with a faulty code stays unchanged. */
 function decode(text) {
   try {
     return decodeURIComponent(text);
@@ -149,7 +149,7 @@ function decode(text) {
   }
 }
 
-/** The number that a text writes, perhaps with its unit, NaN for any other text; a comma may stand for the point. */
+/** The number in a text, which may have a unit or a decimal comma; NaN for any other text. */
 function numberOf(text, unit = "") {
   const bare = (unit && text.trim().endsWith(unit) ? text.trim().slice(0, -unit.length) : text).trim();
   const joined = /^\D?\d{1,3}(\s\d{3})+([.,]\d*)?$/.test(bare) ? bare.replace(/\s/g, "") : bare;
@@ -157,7 +157,7 @@ function numberOf(text, unit = "") {
   return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
 }
 
-/** Why a parameter cannot have a value in SI; empty where it can. */
+/** Why a parameter cannot have a value, given in SI units; empty if it can. */
 function impossible(parameter, value) {
   if (!Number.isFinite(value)) return `${withLabelUnit("a number", parameter.unit)} is wanted, such as 1.25 or −3e−4`;
   const [least, most] = [parameter.least ?? -Infinity, parameter.most ?? Infinity];
@@ -170,17 +170,17 @@ function impossible(parameter, value) {
   return `possible: ${ends.join(" and ")}`;
 }
 
-/** Keep the state in the address, where the page has one of its own. */
-function keepInAddress() {
+/** Write the state to the address of the page, if it has one. */
+function writeAddress() {
   try {
     history.replaceState(null, "", `#${fragmentOf(state)}`);
   } catch {
-    // a frame without an address: the link says so when it is asked for
+    // a frame has no address; `copyLink` says so
   }
 }
 
-/** Take over the state of the address, as one step; returns what of it was ignored. */
-function visit() {
+/** Take the state from the address, as one step of undo; return the parts that were ignored. */
+function readAddress() {
   const fragment = location.hash.slice(1);
   if (fragment === fragmentOf(state)) return [];
   const {found, ignored} = stateOf(fragment);
@@ -188,10 +188,10 @@ function visit() {
   return ignored;
 }
 
-/** The design as the text of a problem file, every parameter fixed, as exactly as doubles can. */
+/** The design as the text of a problem file, in which every parameter is fixed at its double. */
 function problemText() {
   const lines = DATA.parameters.map(({name, unit, one, value, text}, k) => {
-    // a file may have no smaller size
+    // a problem file accepts no smaller number
     const tiny = Math.abs(state.x[k]) < DATA.smallest;
     const number = String(tiny ? 0 : state.x[k] / one);
     const moved = unit ? JSON.stringify(`${number} ${unit}`) : number;
@@ -200,33 +200,33 @@ function problemText() {
   return DATA.toml.before + lines.join("") + DATA.toml.after;
 }
 
-/** Hand the design on as a file. */
+/** Save the design as a problem file. */
 function save() {
   const words = DATA.title.normalize("NFKD").toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-+|-+$/g, "");
   const address = URL.createObjectURL(new Blob([problemText()], {type: "application/toml"}));
   element("a", {href: address, download: `${words.slice(0, 60) || DATA.model}.toml`}).click();
-  // the download has begun by then
+  // the download has begun before this time
   setTimeout(() => URL.revokeObjectURL(address), 60000);
 }
 
-/** Roots given as [re, im >= 0, multiplicity], each as often as it counts, conjugates too where there are any. */
+/** All roots, from roots [re, im >= 0, multiplicity]: each is repeated by its multiplicity, and conjugates are added. */
 function allRoots(meetings) {
   const each = ([re, im]) => (im && !OF_H ? [[re, im], [re, -im]] : [[re, im]]);
   const all = meetings.flatMap((root) => Array(root[2]).fill(each(root)).flat());
   return {re: Float64Array.from(all, (root) => root[0]), im: Float64Array.from(all, (root) => root[1])};
 }
 
-/** Roots as [re, im >= 0, multiplicity], rightmost first: those that rounding alone keeps apart are one. */
+/** Roots as [re, im >= 0, multiplicity], rightmost first. Roots that differ only by rounding are one root. */
 function meetingsAt(a) {
   return meetingsOf(rootsOf(a)).filter(([re]) => Number.isFinite(re)).map(([re, im, times]) => [re, heightOf(im), times]);
 }
 
-/** What stands for the height of a root of the polynomial: of H Re ω. All else knows of no carrier but by rounding. */
+/** The frequency that belongs to the imaginary part of a root of the polynomial; for a complex H it is Re ω. */
 function heightOf(im) {
   return im - (DATA.carrier ?? 0);
 }
 
-/** Everything that follows from the state, once per change, for all pictures. */
+/** Everything that the pictures show of the state, computed once per change. */
 function drawingOf() {
   const a = new Float64Array(MODEL.degree + 1);
   const motion = new Float64Array(3);
@@ -240,7 +240,7 @@ function drawingOf() {
   return {a, meetings, motion, kind: kindOf(a), y, known};
 }
 
-/** Abscissa, least damping ratio and greatest angular frequency of given roots. */
+/** Abscissa, smallest damping ratio and largest angular frequency of roots. */
 function motionOfRoots({re, im}) {
   const ratios = [...re].map((part, k) => (part || im[k] ? -part / Math.hypot(part, im[k]) : 0));
   return [Math.max(...re), Math.min(...ratios), Math.max(...im)];

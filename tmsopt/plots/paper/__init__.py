@@ -1,6 +1,6 @@
 """The figures of Kirillov (2018), drawn from recomputed data.
 
-In: the data of `tmsopt.paper`. Out: figures. Open `gallery` first: the list of them.
+In: the data of `tmsopt.paper`. Out: figures. Read `gallery` first: it has the list of the figures.
 """
 
 import lazy_loader

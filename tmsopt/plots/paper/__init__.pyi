@@ -2,7 +2,7 @@ from .bicycles import (
     bicycle_figure as bicycle_figure, draw_critical_speeds as draw_critical_speeds, draw_law as draw_law,
     experiment_figure as experiment_figure, growth_figure as growth_figure,
 )
-from .gallery import GALLERY as GALLERY, Item as Item, find as find, pictures as pictures
+from .gallery import GALLERY as GALLERY, Item as Item, find_item as find_item, render_pictures as render_pictures
 from .locus import draw_row as draw_row, full_window as full_window, root_locus_figure as root_locus_figure
 from .planes import (
     abscissa_figure as abscissa_figure, draw_plane as draw_plane, draw_swallowtail as draw_swallowtail,

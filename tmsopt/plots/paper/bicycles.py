@@ -12,14 +12,14 @@ from tmsopt.paper.sketch import sketch
 from tmsopt.plots.bicycle import draw_bicycle, draw_distance
 from tmsopt.plots.growth import draw_curves
 from tmsopt.plots.labels import finish_axes
-from tmsopt.plots.style import COMPLEX, CRITICAL, EDGE, LINE, MARK, REAL, STABLE, new_figure, note
+from tmsopt.plots.style import COMPLEX, CRITICAL, EDGE, LINE, MARK, REAL, STABLE, new_figure, write_note
 from tmsopt.problem.problem import Problem
 from tmsopt.search.solve import solve
 
-_POINTS = (("*", MARK, 13, (14, -8)), ("s", CRITICAL, 7, (12, 2)), ("o", REAL, 7, (12, -14)))
-"""Marker, its colour and size, and offset of the text of each bicycle."""
+_BICYCLE_STYLES = (("*", MARK, 13, (14, -8)), ("s", CRITICAL, 7, (12, 2)), ("o", REAL, 7, (12, -14)))
+"""For each bicycle: marker, colour and size of the marker, and offset of the text."""
 
-_CURVES = ((LINE, "-"), (CRITICAL, "--"), (REAL, "-."), (COMPLEX, ":"))
+_CURVE_STYLES = ((LINE, "-"), (CRITICAL, "--"), (REAL, "-."), (COMPLEX, ":"))
 
 
 def bicycle_figure() -> Figure:
@@ -41,11 +41,14 @@ def bicycle_figure() -> Figure:
 def growth_figure() -> Figure:
     """Growth rates Re s with bands of stability and heavy damping, the critical Fr and the Fr of the least abscissa."""
     fixed = {name: value for name, value in benchmark().parameters.items() if name != "Fr"}
-    fastest = solve(Problem(tms, fixed=fixed, free={"Fr": (0.1, 4.0)}, minimize="abscissa"), interruptible=False)
-    best = solve(Problem(tms, fixed=dict(optimised_benchmark().parameters)))
+    benchmark_design = solve(
+        Problem(tms, fixed=fixed, free={"Fr": (0.1, 4.0)}, minimize="abscissa"), interruptible=False
+    )
+    optimised_design = solve(Problem(tms, fixed=dict(optimised_benchmark().parameters)))
     figure = new_figure(9.2, 4.4)
     panels = figure.subplots(1, 2)
-    for ax, design, name in zip(panels, (fastest, best), ("(a) benchmark", "(b) optimised benchmark"), strict=True):
+    designs = {"(a) benchmark": benchmark_design, "(b) optimised benchmark": optimised_design}
+    for ax, (name, design) in zip(panels, designs.items(), strict=True):
         optimum = design.dimensionless["Fr"], design.abscissa
         ax.axhline(optimum[1], color="0.5", linewidth=0.8, linestyle=":")
         names = draw_curves(ax, growth(design, end=4.0), "real")
@@ -75,44 +78,36 @@ def experiment_figure() -> Figure:
 def draw_law(ax: Axes, data: Experiment) -> None:
     """Draw the law χ_B = √(ζ_B/ζ_H) for χ_H = 1, and the bicycles, which have another χ_H."""
     ax.plot(data.ratio, data.law, color=LINE, label=r"$\chi_B = \sqrt{\zeta_B/\zeta_H}$, the law for $\chi_H = 1$")
-    places = [(b.parameters["zeta_B"] / b.parameters["zeta_H"], b.parameters["chi_B"]) for b in data.bicycles]
-    for bicycle, place, (marker, colour, size, offset) in zip(data.bicycles, places, _POINTS, strict=True):
-        ax.plot(*place, marker, color=colour, markersize=size, **EDGE)
-        text = f"{bicycle.name}\n" + rf"$\chi_B = {place[1]:.4g}$, $\chi_H = {bicycle.parameters['chi_H']:.4g}$"
+    points = [(b.parameters["zeta_B"] / b.parameters["zeta_H"], b.parameters["chi_B"]) for b in data.bicycles]
+    for bicycle, point, (marker, colour, size, offset) in zip(data.bicycles, points, _BICYCLE_STYLES, strict=True):
+        ax.plot(*point, marker, color=colour, markersize=size, **EDGE)
+        text = f"{bicycle.name}\n" + rf"$\chi_B = {point[1]:.4g}$, $\chi_H = {bicycle.parameters['chi_H']:.4g}$"
         if np.isfinite(bicycle.omega0):
             text += "\n" + rf"on the law for any $\chi_H$, $\omega_0 = {bicycle.omega0:g}$"
-        note(ax, text, place, offset, verticalalignment="top" if offset[1] < 0 else "bottom")
-    ratio, chi_B = places[0]
+        write_note(ax, text, point, offset, verticalalignment="top" if offset[1] < 0 else "bottom")
+    ratio, chi_B = points[0]
     law = float(np.interp(ratio, data.ratio, data.law))
     ax.plot([ratio, ratio], [chi_B, law], color=MARK)
-    note(ax, f"{100 * (chi_B / law - 1):.1f} % above the law", places[0], (-8, 8), color=MARK)
+    write_note(ax, f"{100 * (chi_B / law - 1):.1f} % above the law", points[0], (-8, 8), color=MARK)
     ax.set(xlim=(1, 3), ylim=(1, 1.8), xlabel=r"$\zeta_B/\zeta_H$", ylabel=r"$\chi_B$")
     ax.legend(loc="upper left")
 
 
 def draw_critical_speeds(ax: Axes, data: Experiment) -> None:
     """Draw Fr_c over χ_B for the geometry of the experimental bicycle, with the minima and the χ_B that was built."""
-    flat = rf"within {100 * FLAT_SHARE:.0f} % of the minimum, $\chi_H = 1$"
-    ax.axvspan(*data.critical[0].flat_range, color=STABLE, alpha=0.25, linewidth=0, label=flat)
-    for curve, (colour, style) in zip(data.critical, _CURVES, strict=False):
+    flat_label = rf"within {100 * FLAT_SHARE:.0f} % of the minimum, $\chi_H = 1$"
+    ax.axvspan(*data.critical[0].flat_range, color=STABLE, alpha=0.25, linewidth=0, label=flat_label)
+    for curve, (colour, style) in zip(data.critical, _CURVE_STYLES, strict=False):
         conditions = " (the law), any $\\mu$" if np.isnan(curve.mu) else rf" as built, $\mu = {curve.mu:g}$"
         ax.plot(curve.chi_B, curve.Fr_c, style, color=colour, label=rf"$\chi_H = {curve.chi_H:g}$" + conditions)
         ax.plot(*curve.minimum, "v", color=colour, markeredgecolor="white")
     ax.plot([], [], "v", color="0.3", label=r"minimum over $\chi_B$")
     chi_B = data.bicycles[0].parameters["chi_B"]
-    words = rf"as built, $\chi_B = {chi_B:g}$"
+    label = rf"as built, $\chi_B = {chi_B:g}$"
     ax.axvline(chi_B, color=MARK)
     speeds = [curve.experimental_Fr_c for curve in data.critical]
-    ax.plot(
-        np.full(len(speeds), chi_B),
-        speeds,
-        "*",
-        markersize=10,
-        color=MARK,
-        label=words,
-        **EDGE,
-    )
-    least = np.nanmin([curve.minimum[1] for curve in data.critical])
-    ax.set(xlim=(1, 2.05), ylim=(0.93 * least, 1.9 * least))
+    ax.plot(np.full(len(speeds), chi_B), speeds, "*", markersize=10, color=MARK, label=label, **EDGE)
+    least_speed = np.nanmin([curve.minimum[1] for curve in data.critical])
+    ax.set(xlim=(1, 2.05), ylim=(0.93 * least_speed, 1.9 * least_speed))
     ax.set(xlabel=r"$\chi_B$", ylabel=r"critical Froude number $\mathrm{Fr}_c$")
     ax.legend(loc="upper center")

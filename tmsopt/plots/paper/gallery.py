@@ -43,7 +43,7 @@ class Item:
         return figure
 
 
-def find(name: str) -> Item:
+def find_item(name: str) -> Item:
     """Find a figure by its name or alias.
 
     Raises:
@@ -117,18 +117,16 @@ GALLERY = Table({item.name: item for item in _ITEMS})
 """Figures by name, in the order of the list."""
 
 
-def pictures(items: Sequence[Item], file_formats: Sequence[str]) -> Generator[tuple[int, bytes]]:
-    """Yield the index and the content of the file of each figure, in the order in which they are finished.
+def render_pictures(items: Sequence[Item], file_formats: Sequence[str]) -> Generator[tuple[int, bytes]]:
+    """Yield (index of the figure, content of its file), in the order in which the figures are finished.
 
-    Several figures are drawn by several processes. If a process crashes, its figure is drawn in this one.
+    Several figures are drawn by several processes. If a process crashes, this process draws its figure.
     """
     workers = min(cores(), len(items))
     with processes(workers) if workers > 1 else in_process() as executor:
-        for place, picture in executor.map(_render_item, zip([item.name for item in items], file_formats, strict=True)):
-            yield (
-                place,
-                _render_item((items[place].name, file_formats[place])) if isinstance(picture, Crash) else picture,
-            )
+        tasks = [*zip([item.name for item in items], file_formats, strict=True)]
+        for index, picture in executor.map(_render_item, tasks):
+            yield index, _render_item(tasks[index]) if isinstance(picture, Crash) else picture
 
 
 def _render_item(task: tuple[str, str]) -> bytes:

@@ -8,17 +8,28 @@ from matplotlib.figure import Figure
 
 from tmsopt.paper.locus import FR_MAX, LocusRow, multiple_roots, table_1_loci
 from tmsopt.plots.labels import Name, place_all
-from tmsopt.plots.style import COMPLEX, CRITICAL, EDGE, LINE, MARK, REAL, arrow, entry, legend_below, new_figure
+from tmsopt.plots.style import (
+    COMPLEX,
+    CRITICAL,
+    EDGE,
+    LINE,
+    MARK,
+    REAL,
+    draw_arrow,
+    legend_below,
+    legend_entry,
+    new_figure,
+)
 from tmsopt.records import Array
 
-_CURVES = ((LINE, 1.5), (CRITICAL, 1.0), (MARK, 1.0))
-"""Colour and width of the loci at the χ_B of the law, below it and above it."""
+_CURVE_STYLES = ((LINE, 1.5), (CRITICAL, 1.0), (MARK, 1.0))
+"""Colour and width of the loci: at the χ_B of the law, below this χ_B, and above it."""
 
 NAMES = {"EP4": r"$\mathrm{EP}_4$", "2EP2": r"$2\mathrm{EP}_2$", "CEP2": r"$\mathrm{CEP}_2$", "EP2": r"$\mathrm{EP}_2$"}
 """Structure → symbol of the paper."""
 
 Window = Array
-"""Limits: left, right, bottom and top."""
+"""Limits of Axes: left, right, bottom and top."""
 
 
 def draw_row(ax: Axes, row: LocusRow, window: Window, arrows: int) -> list[Name]:
@@ -30,10 +41,10 @@ def draw_row(ax: Axes, row: LocusRow, window: Window, arrows: int) -> list[Name]
     label = rf"$|s| = |\omega_0| = {size:.4f}$"
     ax.plot(size * np.cos(angle), size * np.sin(angle), "0.8", linewidth=3.5, gid="circle", label=label)
     ax.set(xlim=window[:2], ylim=window[2:], aspect="equal")
-    for data, (colour, width) in reversed([*zip(row.loci, _CURVES, strict=True)]):
+    for data, (colour, width) in reversed([*zip(row.loci, _CURVE_STYLES, strict=True)]):
         for mode in data.modes:
-            for side in (1, -1) if mode.roots.imag.any() else (1,):
-                track = np.stack([mode.roots.real, side * mode.roots.imag], axis=1)
+            for sign in (1, -1) if mode.roots.imag.any() else (1,):
+                track = np.stack([mode.roots.real, sign * mode.roots.imag], axis=1)
                 ax.plot(*track.T, color=colour, linewidth=width, gid="track")
                 draw_arrows(ax, track, 2 if data is law else arrows, colour)
     names = []
@@ -70,13 +81,16 @@ def root_locus_figure() -> Figure:
         main.set(title=rf"({letter}) $\lambda_s = {exact}{offset} = {tilt:.4f}$ rad", ylabel=r"$\mathrm{Im}\,s$")
         detail.set_title(rf"enlarged: {NAMES[name]} at $\mathrm{{Fr}} = {row.loci[0].design:.6g}$")
         shifts = "", f" - {row.offset:g}", f" + {row.offset:g}"
-        handles = [entry(rf"$\sqrt{{2}}{shift}$", colour) for shift, (colour, _) in zip(shifts, _CURVES, strict=True)]
+        handles = [
+            legend_entry(rf"$\sqrt{{2}}{shift}$", colour)
+            for shift, (colour, _) in zip(shifts, _CURVE_STYLES, strict=True)
+        ]
         main.legend(handles=handles, loc="upper right", title=r"$\chi_B$", handlelength=1.4)
     for ax in axes[-1]:
         ax.set_xlabel(r"$\mathrm{Re}\,s$")
-    key = [handle for ax in axes.flat for handle in ax.get_legend_handles_labels()[0]]
-    key.append(entry(rf"$\mathrm{{Fr}}$ increases from 0 to {FR_MAX:g}", LINE, marker=">"))
-    legend_below(figure, key, 3)
+    handles = [handle for ax in axes.flat for handle in ax.get_legend_handles_labels()[0]]
+    handles.append(legend_entry(rf"$\mathrm{{Fr}}$ increases from 0 to {FR_MAX:g}", LINE, marker=">"))
+    legend_below(figure, handles, 3)
     place_all(names)
     return figure
 
@@ -92,16 +106,16 @@ def _zoom_window(row: LocusRow) -> Window:
     size = abs(row.bicycle.omega0)
     half_width = max(np.ptp(x) / 2 + 0.22 * size, 0.36 * size)
     half_height = half_width * 3.2 / 4.3
-    middle = (x.min() + x.max()) / 2
-    return np.array([middle - half_width, middle + half_width, y.max() - half_height, y.max() + half_height])
+    centre = (x.min() + x.max()) / 2
+    return np.array([centre - half_width, centre + half_width, y.max() - half_height, y.max() + half_height])
 
 
 def draw_arrows(ax: Axes, points: Array, count: int, colour: str) -> None:
-    """Draw arrow heads at equal distances on the visible part of a curve; a short part has none."""
+    """Draw arrow heads at equal distances on the visible part of a curve; a short part gets no arrow."""
     low, high = np.transpose([ax.get_xlim(), ax.get_ylim()])
     is_visible = np.all((points[1:] > low) & (points[1:] < high), axis=1)
     length = np.cumsum(is_visible * np.linalg.norm(np.diff(points, axis=0) / (high - low), axis=1))
     if length.size and length[-1] > 0.12:
         count = count if length[-1] > 0.4 else 1
         for k in np.searchsorted(length, length[-1] * (np.arange(count) + 0.5) / count):
-            arrow(ax, points[k], points[k + 1], color=colour)
+            draw_arrow(ax, points[k], points[k + 1], color=colour)
