@@ -66,14 +66,16 @@ class Big(Fake):
 
 @contextmanager
 def little_room(most):
-    """No file may grow beyond so many bytes, as on a full disk."""
+    """No file may grow beyond so many bytes, as on a full disk; modules that are imported are not cached cut off."""
     import resource
 
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (most, hard))
+    caches, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         yield
     finally:
+        sys.dont_write_bytecode = caches
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 

@@ -190,8 +190,8 @@ def _is_result(text: str) -> bool:
 
 # The formulas for roots of polynomials are not written a second time in JavaScript. Instead, the Python functions are
 # called with symbols, and their operations are recorded. The names `where` and `as_integer` in these functions then
-# stand for operations on symbols. Formulas of quartics are from `tmsopt.roots.quartics`; the conditions of stability for lower
-# degrees are from `lienard_chipart`.
+# stand for operations on symbols. Formulas of quartics are from `tmsopt.roots.quartics`; the conditions of stability
+# for lower degrees are from `lienard_chipart`.
 
 _QUARTIC = 4
 

@@ -109,7 +109,7 @@ def draw_splitting(data: Diagnosis, ax: Axes | None = None) -> Axes:
             max_change = min(max(law.below, law.above, 1e-15), 1.0)
             eps, power = np.array([1e-16, max_change]), law.branches.exponent
             label, style = rf"{response.parameter}: $\varepsilon^{{{power}}}$", "o" + _STYLES[k % 4]
-            shift = law.branches.size * eps ** float(power)
+            shift = law.branches.prefactor * eps ** float(power)
             ax.loglog(eps, shift, style, color=_COLOURS[k % 5], label=label, markevery=[1], markersize=4)
     ax.set(xlabel=r"change $\varepsilon$ of a parameter", ylabel=f"shift of the farthest {root_name}")
     return finish_axes(ax)
