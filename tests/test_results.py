@@ -14,7 +14,7 @@ import pytest
 from matplotlib.axes import Axes
 
 import tmsopt
-from tmsopt.documents import HOME, picture_of
+from tmsopt.documents import MODULE_BY_CLASS, picture_of
 from tmsopt.models import from_coefficients
 
 mpl.use("Agg")
@@ -143,7 +143,7 @@ def test_every_result_is_here():
     """Every public class that shows itself, and no writer without a class; an Explorer is a page already."""
     shown = {n for n in tmsopt.__all__ if inspect.isclass(c := getattr(tmsopt, n)) and hasattr(c, "_repr_html_")}
     shown -= {"Explorer"}
-    assert shown == set(HOME) == {type(made(name)).__name__ for name in RESULTS}
+    assert shown == set(MODULE_BY_CLASS) == {type(made(name)).__name__ for name in RESULTS}
 
 
 @each

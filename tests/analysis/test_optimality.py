@@ -374,7 +374,7 @@ def test_what_is_not_covered_is_said_in_a_line(asked, words):
     found = judged(solved(**asked))
     assert found.verdict == NOT_COVERED
     assert words in found.reason
-    assert found.report().startswith("local optimality: not judged")
+    assert found.report().startswith("local optimality: not decided")
 
 
 def test_an_optimum_over_a_pattern_is_not_judged(ep4):

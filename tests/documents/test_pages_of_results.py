@@ -291,7 +291,7 @@ def test_an_infeasible_page_says_what_is_violated_and_what_to_try():
     for name, amount in solution.violations.items():
         assert stands[name] == f"violated by {amount:.4g}"
     both = "infeasible: no design was found that meets both decay (abscissa &lt;= -1) and slow (Fr &lt;= 1)"
-    assert f'<p class="lead">{both}</p>' in text
+    assert f'<p class="answer">{both}</p>' in text
     assert "<p>smallest change found: " in text
 
 

@@ -83,7 +83,7 @@ def test_rows_that_are_left_out_are_counted():
     told = lines(TableBlock(ROWS, max_rows=3))
     assert len(told) == 1 + 1 + 3 + 1
     assert "6 more rows" in told[-1]
-    kept = lines(TableBlock(ROWS, max_rows=4, keep=frozenset({8})))
+    kept = lines(TableBlock(ROWS, max_rows=4, kept_rows=frozenset({8})))
     assert any(line.split()[0] == "8" for line in kept[2:-1])
 
 
@@ -119,5 +119,5 @@ def test_a_solution_is_green_only_where_it_is_stable_and_no_limit_is_violated():
     cases = ((stable, "good"), (unstable, "bad"), (edge, "doubt"), (replace(stable, status="not_converged"), "bad"))
     for solution, tone in cases:
         document = document_of(solution)
-        first = document.sections[0].blocks[0]
-        assert (first.tone, document.words[-1].tone) == (tone, tone), first.text
+        first = document.chapters[0].blocks[0]
+        assert (first.tone, document.badges[-1].tone) == (tone, tone), first.text

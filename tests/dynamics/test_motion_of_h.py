@@ -103,7 +103,7 @@ def test_on_the_real_axis_an_exceptional_point_grows(frequency):
     motion = tmsopt.simulate(tmsopt.Problem(from_hamiltonian(H), fixed={"w": frequency, "g": 0.3, "k": 0.3}))
     assert np.abs(waves(motion, 2)[:, 1]) == pytest.approx(0.3 * np.asarray(motion["t"]), abs=1e-10)
     assert not motion.stable
-    assert "not stable: on the real axis, where modes merge, it grows as t;" in str(motion)
+    assert "not stable: modes merge on the real axis, so the motion grows as t;" in str(motion)
     assert all(math.isnan(m.settling) for m in motion.measures)
     assert 1 < motion["t"][-1] < 1e3
 
@@ -135,4 +135,4 @@ def test_a_real_double_pair_on_the_axis_grows_too():
     pair = from_matrices(M=[[1, 0], [0, 1]], K=[[1, "b"], [0, 1]])
     motion = tmsopt.simulate(tmsopt.Problem(pair, fixed={"b": 0.5}))
     assert motion.structure == "CEP2"
-    assert "not stable: on the imaginary axis, where modes merge, it grows as t;" in str(motion)
+    assert "not stable: modes merge on the imaginary axis, so the motion grows as t;" in str(motion)

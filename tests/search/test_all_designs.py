@@ -193,13 +193,13 @@ locate = "CEP2"
 
     data, c1_of_one = json.loads(answer("--json")), abs(meeting(0.3, 1.2)[0])
     assert sorted(s["parameters"]["c1"] for s in data["solutions"]) == pytest.approx([-c1_of_one, c1_of_one], abs=1e-11)
-    assert "locate CEP2: 2 solutions in the box, no other exists (proved; " in answer()
+    assert "locate CEP2: 2 solutions within the ranges, no other exists (proved; " in answer()
     assert data["completeness"]["complete"]
     assert (data["complete"], data["undecided"]) == (True, 0)
     assert [s["proved"] for s in data["solutions"]] == [True, True]
     assert data["coverage"] is None
     text = answer("--seconds", "0.001")
-    assert "locate CEP2: 2 solutions in the box" in text
+    assert "locate CEP2: 2 solutions within the ranges" in text
     assert "no proof that these are all: time limit reached" in text
     assert "undecided: c1 -2 … 2, c2 -2 … 2" in text
     assert "95 % confidence; no proof" in text

@@ -42,7 +42,7 @@ def test_the_winner_is_named_and_each_side_is_its_own_problem(fixed, winner):
     assert list(design.sides) == [FORWARD, BACKWARD]
     for side, value in design.sides.items():
         assert value == pytest.approx(tmsopt.solve(on(side, stated), starts=16).value, abs=1e-6 * (1 + abs(value)))
-    assert [f"{winner} is better" in n for n in design.notes if "both signs" in n] == [True]
+    assert [f"{winner} is better" in n for n in design.notes if "rake is better" in n] == [True]
     shown = {side: float(f"{value:.9g}") for side, value in design.sides.items()}  # of designs that are not shown
     assert json.loads(json.dumps(design.to_json()))["sides"] == shown
 

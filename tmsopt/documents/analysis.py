@@ -50,7 +50,7 @@ class Analysis:
 
     @cached_property
     def robustness(self) -> Robustness | None:
-        """The nearest boundary of stability, without that of heavy damping."""
+        """The nearest boundaries of stability; the boundary of heavy damping is left out."""
         if not self._can_be_analysed:
             return None
         start_steps(self._progress, "looking for the nearest boundaries")
@@ -71,15 +71,15 @@ class Analysis:
 
     @cached_property
     def diagnoses(self) -> tuple[Diagnosis, ...]:
-        """How each multiple root splits."""
+        """The kind of each multiple root and how it splits; empty for a solution that is not optimal."""
         optimal = self.solution.status == "optimal" and not self.solution.interrupted
         return diagnose(self.solution, progress=self._progress) if optimal else ()
 
     @cached_property
     def obstacles(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Sentences on why the problem has no answer: for a brief report, and further ones for a full report."""
-        brief, full = (infeasible_sentences(self.solution, full) for full in (False, True))
-        return tuple(brief), tuple(full[len(brief) :])
+        """Two tuples of sentences on why the problem has no answer: for every report, and only for a full report."""
+        brief, complete = (infeasible_sentences(self.solution, full) for full in (False, True))
+        return tuple(brief), tuple(complete[len(brief) :])
 
     @property
     def _can_be_analysed(self) -> bool:

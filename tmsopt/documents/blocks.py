@@ -11,10 +11,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 Level = Literal["brief", "full", "page"]
-"""How much a document holds: a short answer, everything as text, or everything with pictures and long tables."""
+"""How much a document holds: ``brief`` a short answer, ``full`` all text, ``page`` also pictures and long tables."""
 
 Tone = Literal["", "answer", "good", "doubt", "bad", "dim"]
-"""The role of a sentence, a table or a word: the answer itself, a verdict, or (dim) something that cannot change."""
+"""The role of a sentence, a table or a badge: the answer itself, a verdict, or (dim) something that cannot change."""
 
 NO_UNIT = Unit()
 ALL_DIGITS = 12
@@ -71,19 +71,20 @@ class TableBlock:
     Attributes:
         rows: headings, then the cells of each row. If all headings are empty, the table has none.
         caption: caption on a page.
-        priorities: importance of each column. A narrow screen leaves out the least important column first; among equal
-            ones, the last. By default all columns are equal.
-        max_rows: maximum number of rows in a brief document, which counts the other rows.
-        keep: indices of rows that are always shown; the other rows shown are then spread evenly.
+        priorities: importance of each column. A narrow screen leaves out the least important column first. If several
+            are equally important, it begins with the last of them. By default all columns are equal.
+        max_rows: maximum number of rows in a brief document; a line below the table counts the hidden rows.
+        kept_rows: indices of rows that are always shown; the other rows shown are then spread evenly.
         hint: the options that print all rows and columns.
-        fold: a table without headings and with more rows is laid out in several columns, if there is room.
+        fold: a table without headings that has more rows than this is continued in further columns, if there is room;
+            0 if the table is never folded.
     """
 
     rows: Sequence[Row]
     caption: str = ""
     priorities: Sequence[int] = ()
     max_rows: int | None = None
-    keep: frozenset[int] = frozenset()
+    kept_rows: frozenset[int] = frozenset()
     hint: str = "--full"
     fold: int = 0
     tone: Tone = ""
@@ -142,7 +143,7 @@ class Chapter:
 
 @dataclass(frozen=True)
 class Badge:
-    """A word or two of a headline, such as a verdict."""
+    """A few words of a headline, such as a verdict."""
 
     text: str
     tone: Tone = ""
@@ -155,20 +156,20 @@ class Document:
     Attributes:
         kind: the class of the result.
         title: title of the problem; empty if it has none.
-        words: what the result is and how the computation ended.
+        badges: what the result is and how the computation ended.
     """
 
     kind: str
     title: str
-    words: tuple[Badge, ...]
+    badges: tuple[Badge, ...]
     level: Level
-    sections: tuple[Chapter, ...] = ()
+    chapters: tuple[Chapter, ...] = ()
 
 
 Parts = Iterator[tuple[Badge | str, ...] | Chapter | Block | str]
-"""A document in reading order: its words, then chapters, each followed by its blocks. A plain text is a sentence.
+"""A document in reading order: its badges, then chapters, each followed by its blocks. A plain text is a sentence.
 
-`document_of` leaves out empty words and sentences, and the words of a result inside another result.
+`document_of` leaves out empty badges and sentences, and the badges of a result inside another result.
 """
 
 
@@ -178,13 +179,13 @@ def count_things(things: Sized | int, singular: str, plural: str = "") -> str:
     return f"{count} {singular if count == 1 else plural or singular + 's'}"
 
 
-def judge(holds: bool | None, text: str) -> Badge:
+def write_verdict(holds: bool | None, text: str) -> Badge:
     """Write a verdict: the text, or "not" and the text; empty if the answer is unknown."""
     if holds is None:
         return Badge("")
     return Badge(text, "good") if holds else Badge(f"not {text}", "bad")
 
 
-def say_whether(value: bool | None) -> str:
+def format_bool(value: bool | None) -> str:
     """Write yes or no for a table; empty if the answer is unknown."""
     return "" if value is None else "yes" if value else "no"

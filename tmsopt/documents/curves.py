@@ -32,10 +32,14 @@ from tmsopt.tracing.branch import Branch, Trace, kinds_along
 from tmsopt.tracing.domain import Domain
 from tmsopt.tracing.swallowtail import Swallowtail
 
-_MAX_PICTURE_POINTS = 800 * 800  # a picture of a chart shows at most so many grid points
-_POINT_DIGITS = 6  # significant digits of a point on a page
-_ROUNDING_MISMATCH = 1e-14  # a smaller mismatch of the coefficients is only rounding: all digits are shown
-_MAX_MISMATCH = 1e-6  # with a larger mismatch of its coefficients, a point does not belong to the branch
+_MAX_PICTURE_POINTS = 800 * 800
+"""Maximum number of grid points in a picture of a chart."""
+_POINT_DIGITS = 6
+"""Significant digits of a point on a page."""
+_ROUNDING_MISMATCH = 1e-14
+"""If the mismatch of the coefficients is smaller, it is only rounding, and all digits are shown."""
+_MAX_MISMATCH = 1e-6
+"""If the mismatch of its coefficients is larger, a point does not belong to the branch."""
 
 
 def write_trace(trace: Trace, level: Level) -> Parts:
@@ -79,8 +83,8 @@ def _describe_branch(branch: Branch, trace: Trace) -> str:
 
 
 def list_events(branch: Branch, units: Mapping[str, Unit], model: Model | None = None) -> list[Row]:
-    """List headings and the cells of each event, in these units, with the digits that its residual leaves."""
-    rows: list[Row] = [("event", *_head_columns(units), "at")]
+    """List headings and the cells of each event, in these units; uncertain digits are left out."""
+    rows: list[Row] = [("event", *_list_headings(units), "detail")]
     for event in branch.events:
         values = {**event.parameters, "abscissa": float(branch.abscissa[event.index])}
         # the error of a point may be several times the residual of its coefficients: show two digits less
@@ -94,7 +98,7 @@ def name_kind(model: Model | None, name: str) -> str:
     return in_words_of(model, name) if model else name
 
 
-def _head_columns(units: Mapping[str, Unit]) -> Iterator[str]:
+def _list_headings(units: Mapping[str, Unit]) -> Iterator[str]:
     return (f"{n} {unit.text}".rstrip() for n, unit in units.items())
 
 
@@ -106,12 +110,12 @@ def _tabulate_points(trace: Trace) -> Parts:
     """Tabulate points of all branches with their events, in the units of the problem."""
     units = {n: unit_of(trace.problem.posed, n) for n in (*trace.problem.free, "abscissa")}
     model = trace.problem.model
-    swings = () if model.carrier is not None else ("heavily damped",)
-    facts = ("kind", "stable", *swings, "constraints", "event")
+    damping = () if model.carrier is not None else ("heavily damped",)
+    facts = ("kind", "stable", *damping, "constraints", "event")
     records = [*trace.records()]
-    marked = [k for k, record in enumerate(records) if record["event"]]
-    shown_records, note = thin_rows(records, "points", "tmsopt trace FILE --csv curve.csv writes all", marked)
-    rows: list[Row] = [("branch", *_head_columns(units), *facts)]
+    event_rows = [k for k, record in enumerate(records) if record["event"]]
+    shown_records, note = thin_rows(records, "points", "tmsopt trace FILE --csv curve.csv writes all", event_rows)
+    rows: list[Row] = [("branch", *_list_headings(units), *facts)]
     for record in shown_records:
         cells = (in_words_of(model, format_value(record[fact.replace(" ", "_")])) for fact in facts)
         rows.append((str(record["branch"] + 1), *_list_numbers(record, units, _POINT_DIGITS), *cells))
@@ -143,38 +147,38 @@ def write_domain(domain: Domain, _level: Level) -> Parts:
 def describe_domain(domain: Domain, problem: Posed | None = None) -> Iterator[str]:
     """Describe the boundaries of stability and of heavy damping."""
     model = problem.model if problem else None
-    bounded = [("stability", domain.stability)]
+    boundaries = [("stability", domain.stability)]
     if model is None or model.carrier is None:  # a complex system has no heavy damping
-        bounded.append(("heavy damping", domain.heavy_damping))
-    for name, arcs in bounded:
-        points: dict[str, list[int]] = {}
+        boundaries.append(("heavy damping", domain.heavy_damping))
+    for name, arcs in boundaries:
+        point_counts: dict[str, list[int]] = {}
         for arc in arcs:
-            points.setdefault(name_kind(model, arc.kind), []).append(len(next(iter(arc.points.values()))))
+            point_counts.setdefault(name_kind(model, arc.kind), []).append(len(next(iter(arc.points.values()))))
         kinds = [
-            f"{kind} ({f'{len(sizes)} curves, ' if len(sizes) > 1 else ''}{sum(sizes)} points)"
-            for kind, sizes in points.items()
+            f"{kind} ({f'{len(counts)} curves, ' if len(counts) > 1 else ''}{sum(counts)} points)"
+            for kind, counts in point_counts.items()
         ]
-        yield f"{name} is bounded by {', '.join(kinds) or 'nothing in the box'}"
+        yield f"{name} is bounded by {', '.join(kinds) or 'nothing within the ranges'}"
 
 
 def tabulate_corners(domain: Domain, problem: Posed | None = None) -> Iterator[TableBlock]:
-    """Tabulate the corners to all digits, in the units of the problem if it is given; yield nothing without corners."""
+    """Tabulate the corners to all digits, in the units of the problem if it is given; no table if there are none."""
     if not domain.corners:
         return
     model = problem.model if problem else None
     names = {n for arc in (*domain.stability, *domain.heavy_damping) for n in arc.points}
     units = {n: unit_of(problem, n) if problem else Unit() for n in domain.corners[0].parameters if n in names}
     rows: list[Row] = [(name_kind(model, c.name), *_list_numbers(c.parameters, units)) for c in domain.corners]
-    yield TableBlock((("corner", *_head_columns(units)), *rows), "Corners of the domains")
+    yield TableBlock((("corner", *_list_headings(units)), *rows), "Corners of the domains")
 
 
 def write_swallowtail(swallowtail: Swallowtail, _level: Level) -> Parts:
     """Write the patches of the surface, then its edges as traces."""
     edges = f"edges: {count_things(swallowtail.cusps.branches, 'EP3 curve')}"
     yield " ".join(swallowtail.axes), count_things(swallowtail.patches, "patch", "patches"), edges
-    damped = sum(patch.heavily_damped for patch in swallowtail.patches)
-    pieces = f"{len(swallowtail.patches)} patches, {damped} of them bound heavy damping"
-    yield Sentence(f"real negative double roots over {', '.join(swallowtail.axes)}: {pieces}", tone="answer")
+    damped_count = sum(patch.heavily_damped for patch in swallowtail.patches)
+    patches = f"{len(swallowtail.patches)} patches, {damped_count} of them bound heavy damping"
+    yield Sentence(f"real negative double roots over {', '.join(swallowtail.axes)}: {patches}", tone="answer")
     yield Sentence(describe_trace(swallowtail.cusps), "cuspidal edges")
     yield Sentence(describe_trace(swallowtail.crossing), "self-intersection")
 
@@ -186,17 +190,17 @@ def write_chart(chart: Chart, level: Level) -> Parts:
     yield f"{size} designs over {axis_names}", *(f"{100 * share:.3g} % {name}" for name, share in largest_shares)
     data: dict[str, Any] = chart.to_json()
     problem = chart.problem.posed
-    plane = chart.path is None and len(chart.axes) == 2
-    axis_names = " and ".join(chart.axes) if plane else axis_names
+    is_plane = chart.path is None and len(chart.axes) == 2
+    axis_names = " and ".join(chart.axes) if is_plane else axis_names
     yield Sentence(f"{size} designs over {axis_names}", tone="answer")
     yield Chapter("classes")
-    yield from _write_classes(chart, data, plane)
+    yield from _write_classes(chart, data, is_plane)
     yield Chapter("best")
     if best := data["least_abscissa"]:
-        where = ", ".join(f"{n} = {unit_of(problem, n).show(best[n], 6)}" for n in chart.axes)
+        design = ", ".join(f"{n} = {unit_of(problem, n).show(best[n], 6)}" for n in chart.axes)
         value = common_unit(problem, "abscissa").show(best["value"], 6)
-        yield Sentence(f"{value} at {where}", "least abscissa on the grid", "answer")
-    if chart.domain is not None and plane:
+        yield Sentence(f"{value} at {design}", "least abscissa on the grid", "answer")
+    if chart.domain is not None and is_plane:
         yield Chapter("boundaries")
         yield from describe_domain(chart.domain, problem)
         yield from tabulate_corners(chart.domain, problem)
@@ -212,25 +216,28 @@ def write_chart(chart: Chart, level: Level) -> Parts:
         yield from _tabulate_designs(chart)
 
 
-def _write_classes(chart: Chart, data: Mapping[str, Any], plane: bool) -> Parts:
+def _write_classes(chart: Chart, data: Mapping[str, Any], is_plane: bool) -> Parts:
     rows = [(in_words_of(chart.problem.model, n), f"{100 * x:.2f}") for n, x in data["classes"].items() if x]
     if rows:
         yield TableBlock((("class", "share in %"), *rows), "Share of each class")
-    satisfied = data["satisfied"]
-    inequalities = len(chart.problem.constraints) > len(chart.left_aside) if plane else (satisfied or 1) < 1
-    if satisfied is not None and inequalities:
-        yield f"the constraints hold on {100 * satisfied:.2f} %"
-    for name in chart.left_aside if plane else ():
-        yield f"{name} is an equality, which holds on curves and not on a grid: ignored"
+    satisfied_share = data["satisfied"]
+    has_inequalities = (
+        len(chart.problem.constraints) > len(chart.left_aside) if is_plane else (satisfied_share or 1) < 1
+    )
+    if satisfied_share is not None and has_inequalities:
+        yield f"the constraints hold on {100 * satisfied_share:.2f} %"
+    for name in chart.left_aside if is_plane else ():
+        yield f"{name} is ignored: it is an equality, which holds on curves and not on a grid"
 
 
 def _tabulate_designs(chart: Chart) -> Parts:
     """Tabulate the designs of the grid; if there are too many, every k-th one along each axis."""
     problem, thinned = chart.problem, _thin_chart(chart, MAX_ROWS)
-    left_out = [] if len(problem.constraints) > len(chart.left_aside) else ["satisfied", "margin"]
-    left_out += [] if problem.model.carrier is None else ["damping_ratio", "real_roots"]  # a complex system has neither
+    hidden_layers = [] if len(problem.constraints) > len(chart.left_aside) else ["satisfied", "margin"]
+    if problem.model.carrier is not None:  # a complex system has neither of these layers
+        hidden_layers += ["damping_ratio", "real_roots"]
     grid = reversed(np.meshgrid(*reversed(thinned.grid), indexing="ij"))
-    layers = {n: layer for n, layer in thinned.layers.items() if n not in left_out}
+    layers = {n: layer for n, layer in thinned.layers.items() if n not in hidden_layers}
     columns: dict[str, list[Cell | str]] = {}
     for name, layer in (*zip(chart.axes, grid, strict=True), *layers.items()):
         values = np.asarray(layer).ravel().tolist()

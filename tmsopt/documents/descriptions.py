@@ -68,8 +68,8 @@ def _tabulate_symbols(symbols: Iterable[Symbol]) -> Block | str:
 def _format_matrix(name: str, rows: Sequence[Sequence[str]]) -> str:
     """Write a matrix with aligned columns."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    lead = f"{name} = "
+    prefix = f"{name} = "
     return "\n".join(
-        f"{lead if k == 0 else ' ' * len(lead)}[{'  '.join(e.rjust(w) for e, w in zip(row, widths, strict=True))}]"
+        f"{prefix if k == 0 else ' ' * len(prefix)}[{'  '.join(e.rjust(w) for e, w in zip(row, widths, strict=True))}]"
         for k, row in enumerate(rows)
     )

@@ -21,11 +21,12 @@ from tmsopt.problem.verdict.stability import ROUNDED
 from tmsopt.records import Numbers
 from tmsopt.roots import Root
 
-BRIEF = 5
+BRIEF_DIGITS = 5
 """Significant digits of a number in a brief report."""
 ZERO_SHARE = 1e-14
 """A number below this share of its scale (the size of a root, or 1) is only rounding and is shown as 0."""
-_RANGE_ROUNDING = 1e-12  # a value below this share of the length of its range is only rounding and is shown as 0
+_RANGE_ROUNDING = 1e-12
+"""A value below this share of the length of its range is only rounding and is shown as 0."""
 PERCENT = Unit("%", 0.01)
 
 
@@ -35,23 +36,23 @@ def convert_to_si(solution: Solution, w: float = 1.0, m_B: float = 1.0, g: float
     return solution.parameters if needs_no_conversion else to_si(solution.dimensionless, w, m_B, g)
 
 
-def head_other_form(solution: Solution, si: Numbers) -> str:
-    """Heading of the numbers that are converted: to numbers without units, or to SI with this scale."""
+def write_other_heading(solution: Solution, si: Numbers) -> str:
+    """Write the heading of the numbers in the other parameter set: without units, or in SI with the scale used."""
     if solution.problem.posed.parameter_set.rate is not None:
         return "without units"
     return f"in SI if w = {si['w']:g} m, m_B = {si['m_B']:g} kg" if {"w", "m_B"} <= si.keys() else "in SI"
 
 
 def list_parameters(solution: Solution, si: Numbers, brief: bool = False) -> Iterator[tuple[str, Cell, str, str, str]]:
-    """List name, number, role, value in the other set, and meaning of each parameter.
+    """List the name, number, role, value in the other set, and meaning of each parameter.
 
     Fixed parameters that are 0 by default are left out.
 
     Args:
         si: the parameters in SI; for a model with only one set, the parameters of the solution.
-        brief: whether numbers have few digits and their units.
+        brief: whether the numbers have few digits and are followed by their units.
     """
-    problem, digits = solution.problem.posed, BRIEF if brief else ALL_DIGITS
+    problem, digits = solution.problem.posed, BRIEF_DIGITS if brief else ALL_DIGITS
     other_sets = [s for s in problem.model.sets if s is not problem.parameter_set]
     for p in problem.parameter_set.parameters:
         x, (lower, upper) = solution.parameters[p.name], problem.free.get(p.name, (0.0, 0.0))
@@ -59,20 +60,20 @@ def list_parameters(solution: Solution, si: Numbers, brief: bool = False) -> Ite
         role = "free" if p.name in problem.free else "scenario" if p.name in problem.scenarios else "fixed"
         if role == "fixed" and x == 0 == p.default:
             continue
-        counterpart = ""
+        counterpart_text = ""
         for other_set in other_sets:
             values = solution.dimensionless if other_set.rate is None else si
             for q in other_set.parameters if p.name not in other_set.names else ():
                 if p.counterpart == q.name or q.counterpart == p.name:
-                    counterpart = counterpart or _describe_twin(q, values[q.name], digits)
+                    counterpart_text = counterpart_text or _describe_counterpart(q, values[q.name], digits)
         meaning = "" if p.meaning == "parameter" else p.meaning
-        yield p.name, Cell(x, unit_of(problem, p.name), digits, with_unit=brief), role, counterpart, meaning
+        yield p.name, Cell(x, unit_of(problem, p.name), digits, with_unit=brief), role, counterpart_text, meaning
 
 
 def tabulate_parameters(solution: Solution, si: Numbers) -> TableBlock:
     """Tabulate every parameter with its role, range, value in the other set, and meaning."""
     ranges = {w.name: w.given for parameter_set in describe(solution).sets for w in parameter_set.parameters}
-    other_form = head_other_form(solution, si)
+    other_form = write_other_heading(solution, si)
     rows: list[Row] = [("parameter", "value", "unit", "free or fixed", "range", other_form, "meaning")]
     for name, cell, role, counterpart, meaning in list_parameters(solution, si):
         rows.append((name, cell, cell.unit.text, role, ranges[name] if role == "free" else "", counterpart, meaning))
@@ -80,7 +81,7 @@ def tabulate_parameters(solution: Solution, si: Numbers) -> TableBlock:
 
 
 def list_quantities(solution: Solution, si: Numbers) -> Iterator[Row]:
-    """List name, number, unit, value in SI if the number is dimensionless, and meaning of each finite quantity."""
+    """List the name, number, unit, value in SI if the number is dimensionless, and meaning of each finite quantity."""
     problem = solution.problem.posed
     parameter_set = problem.parameter_set
     si_set = next((s for s in problem.model.sets if s.rate is not None and s is not parameter_set), None)
@@ -92,9 +93,10 @@ def list_quantities(solution: Solution, si: Numbers) -> Iterator[Row]:
         cell = Cell(x, unit_of(problem, q.name))
         if q.share:
             cell = Cell(x if abs(x) > FEASIBILITY_TOLERANCE else 0.0, PERCENT, 6)
-        twin = q.counterpart
-        counterpart = "" if twin is None or values is None else _describe_twin(twin, float(twin.value(values)))
-        yield q.name, cell, cell.unit.text, counterpart, q.meaning
+        text, counterpart = "", q.counterpart
+        if counterpart is not None and values is not None:
+            text = _describe_counterpart(counterpart, float(counterpart.value(values)))
+        yield q.name, cell, cell.unit.text, text, q.meaning
 
 
 def list_cases(solution: Solution) -> list[Case]:
@@ -112,7 +114,7 @@ def parameters_of_worst_case(solution: Solution) -> Numbers:
 
 def describe_motion(solution: Solution) -> str:
     """Describe how fast a disturbance dies out or grows, and at which frequencies it oscillates."""
-    rate, time, hertz = _time_units(solution)
+    rate, time_unit, frequency_unit = _find_time_units(solution)
     abscissa = solution.abscissa * rate
     if solution.stable is None:
         return "no motion to describe: a root is at infinity"
@@ -120,22 +122,22 @@ def describe_motion(solution: Solution) -> str:
     growth = f"grows as {stability.growth}{'' if solution.edge_is_exact else ROUNDED}"
     decay_text = growth if stability.growth else "neither decay nor growth"
     if not stability.on_edge:
-        decay_text = f"{'decay' if abscissa < 0 else 'growth'} time {time.show(1 / abs(abscissa), 4)}"
+        decay_text = f"{'decay' if abscissa < 0 else 'growth'} time {time_unit.show(1 / abs(abscissa), 4)}"
     if solution.problem.model.carrier is not None:
-        edge = growth if stability.growth else "neither loss nor gain"
-        gain = f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({decay_text})"
-        real = _name_real(solution) if stability.on_edge or solution.beyond_axis else ""
-        return f"{edge if stability.on_edge else gain}{real}"
+        edge_text = growth if stability.growth else "neither loss nor gain"
+        gain_text = f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({decay_text})"
+        real_text = _name_real_eigenfrequencies(solution) if stability.on_edge or solution.beyond_axis else ""
+        return f"{edge_text if stability.on_edge else gain_text}{real_text}"
     oscillations = [f for f in frequencies(solution.roots, rate) if f * 2 * math.pi > 1e-9 * rate]
     if not oscillations:
         return f"{decay_text}; no oscillation"
-    factor, prefix = (1.0, "") if hertz.text == "Hz" else (2 * math.pi, "angular ")
+    factor, prefix = (1.0, "") if frequency_unit.text == "Hz" else (2 * math.pi, "angular ")
     name = prefix + ("frequency" if len(oscillations) == 1 else "frequencies")
     values = " and ".join(f"{factor * f:.4g}" for f in dict.fromkeys(oscillations))
     ratio, damped_speed = solution.quantities["damping_ratio"], describe_speed(solution, solution.least_damped)
-    at = f" at {damped_speed}" if damped_speed and damped_speed != describe_speed(solution, solution.worst) else ""
-    damping = f"damping ratio {ratio if abs(ratio) > ZERO_SHARE else 0:.4g}{at}"
-    return f"{decay_text}; {name} {values} {hertz.text}".rstrip() + f"; {damping}"
+    speed = f" at {damped_speed}" if damped_speed and damped_speed != describe_speed(solution, solution.worst) else ""
+    damping = f"damping ratio {ratio if abs(ratio) > ZERO_SHARE else 0:.4g}{speed}"
+    return f"{decay_text}; {name} {values} {frequency_unit.text}".rstrip() + f"; {damping}"
 
 
 def describe_speed(solution: Solution, case: Case | None) -> str:
@@ -160,7 +162,7 @@ def describe_loads(solution: Solution) -> str:
 
 
 def describe_pitching(solution: Solution) -> str:
-    """Describe whether the bicycle pitches over in any case, and which ballast prevents it."""
+    """Describe whether the bicycle pitches over in any case, and the ballast that prevents it."""
     cases = list_cases(solution)
     case_values: list[Mapping[str, Any]] = [
         solution.problem.posed.values(case.applied(solution.parameters)) for case in cases
@@ -183,15 +185,19 @@ def _describe_ballast(solution: Solution, case_values: Sequence[Mapping[str, Any
     for name, unit in units.items():
         if name in problem.vocabulary:
             needed = unit.show(max(float(values[name]) for values in case_values), 4)
-            return f"; ballast of {needed} at the {wheel} contact prevents this and does not change lean and steer"
+            return (
+                f"; ballast of {needed} at the {wheel} contact prevents this without changing the lean and steer motion"
+            )
     return ""
 
 
 def describe_inertia(solution: Solution) -> str:
     """List the largest moments of inertia for which the design stays stable, also as radii of gyration √(I/m)."""
-    length, parts = unit_of(solution.problem.posed, "w"), []
+    length_unit, parts = unit_of(solution.problem.posed, "w"), []
     for name, inertia in (solution.inertia_margin or {}).items():
-        radius = "" if inertia is None else length.show(math.sqrt(inertia / solution.parameters[INERTIAS[name]]), 3)
+        radius = (
+            "" if inertia is None else length_unit.show(math.sqrt(inertia / solution.parameters[INERTIAS[name]]), 3)
+        )
         parts.append(f"{name} {inertia:.4g} kg m^2 ({radius})" if radius else f"{name} without limit")
     return ", ".join(parts)
 
@@ -216,7 +222,7 @@ def describe_roots(solution: Solution, digits: int) -> tuple[str, str]:
 
 
 def format_root(root: Any, digits: int, multiplicity: int = 1, threshold: float = 0.0) -> str:
-    """Write the eigenfrequency of a record if it has one, otherwise its root or pair of roots."""
+    """Write the eigenfrequency of a root if it has one, otherwise the root or the pair of roots."""
     if (omega := root.eigenfrequency) is not None:
         return format_frequency(omega.real, omega.imag, digits, multiplicity, threshold)
     return format_pair(root.re, root.im, digits, multiplicity, threshold)
@@ -251,8 +257,8 @@ def format_multiplicity(multiplicity: int) -> str:
     return f" ({multiplicity}-fold)" if multiplicity > 1 else ""
 
 
-def describe_stored(solution: Solution) -> Iterator[str]:
-    """Describe to all digits the abscissa of the design, that of its stored numbers, and the roots."""
+def describe_abscissas(solution: Solution) -> Iterator[str]:
+    """Describe the abscissa of the design, its abscissa after rounding to doubles, and its roots, to 12 digits."""
     problem, case_parameters = solution.problem.posed, parameters_of_worst_case(solution)
     size = max((r.size for r in solution.of_polynomial.roots), default=1.0)
     abscissas = (solution.abscissa, solution.abscissa_realised)
@@ -264,8 +270,8 @@ def describe_stored(solution: Solution) -> Iterator[str]:
     yield f"{label} to {ALL_DIGITS} digits: {text}"
 
 
-def _time_units(solution: Solution) -> tuple[float, Unit, Unit]:
-    """Return the size of a rate of 1, and the units of time and of frequency: s and Hz, or the model's own units."""
+def _find_time_units(solution: Solution) -> tuple[float, Unit, Unit]:
+    """Return the factor from roots to 1/s (or 1), and the units of time and frequency: s and Hz, or the model's own."""
     parameter_set = solution.problem.posed.parameter_set
     if parameter_set.rate is not None:
         return float(parameter_set.rate(parameters_of_worst_case(solution))), Unit("s"), Unit("Hz")
@@ -273,7 +279,7 @@ def _time_units(solution: Solution) -> tuple[float, Unit, Unit]:
     return 1.0, Unit("√(w/g)" if has_natural_time else ""), Unit("√(g/w)" if has_natural_time else "")
 
 
-def _name_real(solution: Solution) -> str:
+def _name_real_eigenfrequencies(solution: Solution) -> str:
     """Name the real eigenfrequencies of a complex system."""
     model = solution.problem.model
     real_frequencies = eigenfrequencies(model, roots_on_axis(model, solution.roots))
@@ -283,6 +289,6 @@ def _name_real(solution: Solution) -> str:
     return f"; {' and '.join(texts)} {'is' if len(texts) == 1 else 'are'} real" if texts else ""
 
 
-def _describe_twin(twin: Parameter | Quantity, x: float, digits: int = ALL_DIGITS) -> str:
+def _describe_counterpart(counterpart: Parameter | Quantity, x: float, digits: int = ALL_DIGITS) -> str:
     """Write a parameter or quantity of the other set with its value."""
-    return f"{twin.name} = {Unit('' if twin.unit == '1' else twin.unit).show(x, digits)}"
+    return f"{counterpart.name} = {Unit('' if counterpart.unit == '1' else counterpart.unit).show(x, digits)}"

@@ -22,12 +22,16 @@ from tmsopt.documents.blocks import (
     count_things,
 )
 from tmsopt.documents.design_rows import format_pair, format_root
-from tmsopt.documents.tables import without_empty_columns
+from tmsopt.documents.tables import remove_empty_columns
 
-_MAX_COST, _ZERO = 0.05, 1e-9
-"""Largest relative loss of decay and objective that rounding may cause; a smaller absolute loss than `_ZERO` is 0."""
-_SMALLEST_SHOWN, _ROUNDING_ERROR = 1e-16, 1e-13
-"""A smaller singular value is shown as "below" this one; the error of an abscissa by rounding."""
+_MAX_COST = 0.05
+"""Largest relative loss of decay and objective that rounding may cause."""
+_ZERO = 1e-9
+"""An absolute loss that is smaller counts as 0."""
+_SMALLEST_SHOWN = 1e-16
+"""A singular value that is smaller is shown as "less than" this number."""
+_ROUNDING_ERROR = 1e-13
+"""Error of an abscissa by rounding."""
 _UNRESOLVED = (
     "no power of ε fits two changes that differ by a factor of 100; write constants exactly, such as sqrt(2) or 8/3, "
     "or solve with another value"
@@ -38,7 +42,7 @@ def write_explanation(explanation: Explanation, _level: Level) -> Parts:
     """Write the meaning, local optimality, warnings, the effect of each limit, and the cost of rounding."""
     warnings = count_things(explanation.warnings, "warning") if explanation.warnings else ""
     limits = count_things(explanation.levers, "limit")
-    yield explanation.structure, *_judge_optimality(explanation.optimality), limits, warnings
+    yield explanation.structure, *_summarise_optimality(explanation.optimality), limits, warnings
     yield Chapter("meaning")
     yield Sentence(explanation.summary, "meaning", "answer")
     yield from write_optimality(explanation.optimality)
@@ -55,28 +59,27 @@ def write_explanation(explanation: Explanation, _level: Level) -> Parts:
 
 
 def describe_rounding(explanation: Explanation) -> str:
-    """Describe the fewest digits that suffice, the cost of fewer digits, and the parameter that needs the most digits.
+    """Describe the fewest digits that suffice, the effect of fewer digits, and the parameter that needs most digits.
 
     Digits suffice if the rounded design is stable, meets all limits, and loses at most 5 % in decay and objective.
     """
     rows = explanation.precision
     if not rows or not math.isfinite(explanation.abscissa):
         return ""
-    stable = explanation.abscissa < -_ZERO
+    is_stable = explanation.abscissa < -_ZERO
     sufficient_rows = takewhile(lambda row: _is_near(row, explanation) and not row.violations, reversed(rows))
-    fewest = [None, *sufficient_rows][-1]  # with still fewer digits a design may be good by chance
-    rounded_design = next((row for row in rows if row.digits == SINGLE_DIGITS), None)
-    parts, unstable = [], False
-    if stable and rounded_design and rounded_design.realised < 0 and (fewest is None or fewest.digits > SINGLE_DIGITS):
-        parts.append(f"with {SINGLE_DIGITS} digits the design {_describe_cost(rounded_design, explanation)}")
-    if stable and rounded_design and not rounded_design.realised < 0:
-        alone, unstable = explanation.rounding.get(explanation.worst), True
-        worst = f" ({explanation.worst} alone: {alone.written[explanation.worst]})" if alone else ""
-        parts.append(f"with {SINGLE_DIGITS} digits the design is unstable{worst}")
-    last = fewest or rows[-1]
-    effect = (_describe_benefit if fewest else _describe_cost)(last, explanation)
-    parts.append(f"with {last.digits} digits {'it' if parts else 'the design'} {effect}")
-    needs = f"; {explanation.worst} needs the most digits" if explanation.worst and not unstable else ""
+    fewest_digits = [None, *sufficient_rows][-1]  # with still fewer digits a design may be good by chance
+    few_digits = next((row for row in rows if row.digits == SINGLE_DIGITS), None)
+    parts, becomes_unstable = [], False
+    if is_stable and few_digits and not few_digits.realised < 0:
+        single_row, becomes_unstable = explanation.rounding.get(explanation.worst), True
+        cause = f" ({explanation.worst} alone: {single_row.written[explanation.worst]})" if single_row else ""
+        parts.append(f"with {SINGLE_DIGITS} digits the design is unstable{cause}")
+    elif is_stable and few_digits and (fewest_digits is None or fewest_digits.digits > SINGLE_DIGITS):
+        parts.append(f"with {SINGLE_DIGITS} digits the design {_describe_effect(few_digits, explanation)}")
+    row = fewest_digits or rows[-1]
+    parts.append(f"with {row.digits} digits {'it' if parts else 'the design'} {_describe_effect(row, explanation)}")
+    needs = f"; {explanation.worst} needs the most digits" if explanation.worst and not becomes_unstable else ""
     return f"{'; '.join(parts)}{needs}"
 
 
@@ -87,26 +90,20 @@ def _is_near(row: RoundedDesign, explanation: Explanation) -> bool:
     return is_decay_near and not deviation > max(_MAX_COST * abs(explanation.value), _ZERO)
 
 
-def _describe_benefit(row: RoundedDesign, explanation: Explanation) -> str:
+def _describe_effect(row: RoundedDesign, explanation: Explanation) -> str:
+    """Describe the effect of rounding on the decay, the stability and the limits."""
     if explanation.abscissa >= -_ZERO:
-        return f"shifts its rightmost root by {row.loss:.2g}" if row.loss > _ZERO else "hardly changes"
-    share = min(math.floor(round(100 * row.realised / explanation.abscissa, 6)), 100)
-    return f"keeps {share} % of the decay rate"
-
-
-def _describe_cost(row: RoundedDesign, explanation: Explanation) -> str:
-    """Describe the effect of too few digits."""
-    if explanation.abscissa < -_ZERO and row.realised >= 0:
+        effect = f"shifts its rightmost root by {row.loss:.2g}" if row.loss > _ZERO else "hardly changes"
+    elif row.realised >= 0:
         return "is unstable"
-    if _is_near(row, explanation) or explanation.abscissa >= -_ZERO:
-        cost = _describe_benefit(row, explanation)
     else:
-        cost = f"loses {100 * row.loss / -explanation.abscissa:.2g} % of the decay rate"
-    return f"{cost} and violates the limit {' and '.join(map(repr, row.violations))}" if row.violations else cost
+        share = min(math.floor(round(100 * row.realised / explanation.abscissa, 6)), 100)
+        effect = f"keeps {share} % of the decay rate"
+    return f"{effect} but violates the limit {' and '.join(map(repr, row.violations))}" if row.violations else effect
 
 
 def tabulate_rounding(explanation: Explanation) -> TableBlock:
-    """Tabulate the effect of rounding each parameter alone, then all together."""
+    """Tabulate the effect of rounding: first each parameter alone, then all parameters together."""
     labelled_rows = [(f"{name} alone", row.written[name], row) for name, row in explanation.rounding.items()]
     labelled_rows += [("all", f"{row.digits} digits", row) for row in explanation.precision]
     has_ratios = any(math.isfinite(row.damping_ratio) for *_, row in labelled_rows)
@@ -116,10 +113,11 @@ def tabulate_rounding(explanation: Explanation) -> TableBlock:
         ratio = (f"{_drop_noise(row.damping_ratio):.4g}",) if has_ratios else ()
         abscissa, loss = Cell(row.realised, error=_ROUNDING_ERROR), f"{_drop_noise(row.loss):.2g}"
         rows.append((label, value_text, abscissa, loss, *ratio, ", ".join(row.violations)))
-    return TableBlock(rows, "What rounding does")
+    return TableBlock(rows, "Effect of rounding")
 
 
-def _judge_optimality(optimality: Optimality) -> tuple[Badge, str]:
+def _summarise_optimality(optimality: Optimality) -> tuple[Badge, str]:
+    """Return the verdict, and the order that decides it (empty if there is none)."""
     tones: dict[str, Tone] = {STRICT: "good", NOT_MINIMAL: "bad"}
     order = f"by order {optimality.order}" if optimality.order else ""
     return Badge(optimality.verdict, tones.get(optimality.verdict, "doubt")), order
@@ -127,19 +125,19 @@ def _judge_optimality(optimality: Optimality) -> tuple[Badge, str]:
 
 def write_optimality(optimality: Optimality, _level: Level = "full") -> Parts:
     """Write the verdict, then the multipliers of each rightmost root."""
-    yield _judge_optimality(optimality)
+    yield _summarise_optimality(optimality)
     if optimality.verdict == NOT_COVERED:
-        yield Sentence(f"not judged: {optimality.reason}", "local optimality")
+        yield Sentence(f"not decided: {optimality.reason}", "local optimality")
         return
     yield Sentence(optimality.reason, "local optimality")
     if optimality.roots:
         of_H = optimality.roots[0].eigenfrequency is not None
         root = "an eigenfrequency of the largest Im ω" if of_H else "a root on the rightmost line"
-        balance = f"the optimality conditions hold within {optimality.residual:.1g}"
-        yield f"increase of the objective if {root} is forced to move by one unit ({balance}):"
+        residual_text = f"the optimality conditions hold within {optimality.residual:.1g}"
+        yield f"increase of the objective if {root} is forced to move by one unit ({residual_text}):"
         head = ("root", "down" if of_H else "to the left", "share of the total", "if a multiple root splits")
         rows = [head, *map(_list_root, optimality.roots)]
-        yield TableBlock(without_empty_columns(rows), "Multipliers")
+        yield TableBlock(remove_empty_columns(rows), "Multipliers")
 
 
 def _list_root(root: RightmostRoot) -> tuple[str, ...]:
@@ -149,7 +147,7 @@ def _list_root(root: RightmostRoot) -> tuple[str, ...]:
 
 
 def _drop_noise(x: float, size: float = 1.0) -> float:
-    """Replace a number by 0 if it is only rounding compared with `size`."""
+    """Replace a number by 0 if it is only a rounding error of numbers of this size."""
     return 0.0 if abs(x) <= _ROUNDING_ERROR * size else x
 
 
@@ -167,15 +165,15 @@ def write_diagnosis(diagnosis: Diagnosis, level: Level = "full") -> Parts:
 def _describe_root(diagnosis: Diagnosis) -> str:
     vectors = count_things(diagnosis.geometric, "independent eigenvector")
     if diagnosis.jordan is None:
-        reason = "no matrices decide it: one Jordan chain is assumed, as for a companion matrix"
+        reason = "no eigenvectors are known, so one Jordan chain is assumed, as for a companion matrix"
     else:
         jordan = diagnosis.jordan
         zero = f"{jordan.zero:.1g}" if jordan.zero > _SMALLEST_SHOWN else f"less than {_SMALLEST_SHOWN:g}"
-        is_zero = f"is {zero} and counts"
+        zero_text = f"is {zero} and counts"
         if diagnosis.geometric > 1:
-            is_zero = f"{diagnosis.geometric} are at most {zero} and count"
+            zero_text = f"{diagnosis.geometric} are at most {zero} and count"
         reason = vectors + (f" instead of {diagnosis.algebraic}" if diagnosis.geometric < diagnosis.algebraic else "")
-        reason += f"; singular values of the matrix, divided by the largest: the smallest {is_zero} as 0"
+        reason += f"; singular values of the matrix, divided by the largest: the smallest {zero_text} as 0"
         reason += f", the next is {jordan.nonzero:.2g}" if jordan.nonzero < math.inf else ""
     lengths = ", ".join(map(str, diagnosis.partial))
     plural = "s" if len(diagnosis.partial) > 1 else ""
@@ -186,7 +184,7 @@ def _describe_root(diagnosis: Diagnosis) -> str:
 
 
 def _describe_splitting(diagnosis: Diagnosis, full: bool) -> str:
-    """Describe the laws of every parameter, the most sensitive first; a table follows in a full report."""
+    """Describe how each parameter moves the root, the most sensitive first; if `full`, only the most sensitive."""
     moving_responses = [r for r in diagnosis.responses if r.laws]
     unresolved_names = [r.parameter for r in diagnosis.responses if r.unresolved]
     unmoved_names = [r.parameter for r in diagnosis.responses if not (r.laws or r.unresolved)]
@@ -205,8 +203,8 @@ def _describe_splitting(diagnosis: Diagnosis, full: bool) -> str:
         ]
     if unmoved_names:
         verb = "does" if len(unmoved_names) == 1 else "do"
-        is_fixed = len(unmoved_names) == len(diagnosis.responses)
-        parts.append("no parameter moves it" if is_fixed else f"{', '.join(unmoved_names)} {verb} not move it")
+        never_moves = len(unmoved_names) == len(diagnosis.responses)
+        parts.append("no parameter moves it" if never_moves else f"{', '.join(unmoved_names)} {verb} not move it")
     if unresolved_names:
         parts.append(f"not resolved for {', '.join(unresolved_names)}: {_UNRESOLVED}")
     return "; ".join(parts)
@@ -239,6 +237,6 @@ def _list_laws(diagnosis: Diagnosis) -> list[Row]:
             lower = f"{law.least:.2g} <= " if law.least else ""
             ends = (f"{lower}|ε| <= {x:.2g}" for x in (law.below, law.above))
             rows.append((response.parameter, change, str(law.branches.roots), _format_law(law), *ends))
-        for count, word in ((response.unmoved, "no shift"), (response.unresolved, "not resolved")):
-            rows += [(response.parameter, change, str(count), word, "", "")] if count else []
+        for root_count, text in ((response.unmoved, "no shift"), (response.unresolved, "not resolved")):
+            rows += [(response.parameter, change, str(root_count), text, "", "")] if root_count else []
     return rows

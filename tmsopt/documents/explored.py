@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 NamedDesign = tuple[str, Mapping[str, float]]
 
-_MAX_BUTTONS = 8  # designs with a button at most
+_MAX_BUTTONS = 8
+"""Maximum number of designs that have a button."""
 
 
 def frame_explorer(result: Any, design: Solution | None) -> str:
@@ -33,7 +34,7 @@ def frame_explorer(result: Any, design: Solution | None) -> str:
     of_H = problem.model.carrier is not None
     roots, side = ("eigenfrequencies", "below the real axis") if of_H else ("roots", "left of the imaginary axis")
     return (
-        f"<p>Move a parameter, and see the {roots} move: disturbances die out where all are {side}.</p>\n"
+        f"<p>Move a parameter, and see the {roots} move: disturbances die out if all of them are {side}.</p>\n"
         f"{frame(page_of(base, designs, trace_curves=True), 'Explorer of this problem')}\n"
         '<p class="print">The explorer works in the file, not on paper.</p>'
     )
@@ -53,7 +54,7 @@ def find_designs(result: Any, design: Solution | None) -> tuple[Posed | Solution
 
 
 def _number_designs(designs: Iterable[NamedDesign]) -> list[NamedDesign]:
-    """Return the first designs, without repeated values; designs with the same name get numbers."""
+    """Return the first designs, each set of values once; designs with the same name get numbers."""
     unique_designs: dict[tuple[float, ...], NamedDesign] = {}
     for name, values in designs:
         unique_designs.setdefault(tuple(values.values()), (name, values))
@@ -80,15 +81,15 @@ def _scale_abscissa(problem: Posed, design: "Solution | Row") -> float:
 
 def _list_trace(trace: "Trace") -> Iterator[NamedDesign]:
     """List exceptional points, then the point with the fastest decay, then the other events except at limits."""
-    events = [(e, branch) for branch in trace.branches for e in branch.events if e.name not in _ENDS]
-    events.sort(key=lambda at: _replace_nan(at[1].abscissa[at[0].index]))
+    events = [(e, branch) for branch in trace.branches for e in branch.events if e.name not in _LIMIT_EVENTS]
+    events.sort(key=lambda pair: _replace_nan(pair[1].abscissa[pair[0].index]))
     designs = [("EP" in e.name, in_words_of(trace.problem.model, e.name), e.parameters) for e, _ in events]
-    yield from ((name, values) for meets, name, values in designs if meets)
+    yield from ((name, values) for is_exceptional, name, values in designs if is_exceptional)
     points = [(branch, k) for branch in trace.branches for k in range(len(branch))]
     if points:
-        branch, k = min(points, key=lambda at: _replace_nan(at[0].abscissa[at[1]]))
+        branch, k = min(points, key=lambda point: _replace_nan(point[0].abscissa[point[1]]))
         yield "least abscissa", {n: float(column[k]) for n, column in branch.parameters.items()}
-    yield from ((name, values) for meets, name, values in designs if not meets)
+    yield from ((name, values) for is_exceptional, name, values in designs if not is_exceptional)
 
 
 def _list_chart(chart: "Chart") -> Iterator[NamedDesign]:
@@ -123,7 +124,7 @@ def _replace_nan(value: float) -> float:
     return math.inf if math.isnan(value) else value
 
 
-_ENDS = ("end", "constraint")
+_LIMIT_EVENTS = ("end", "constraint")
 """Names of events at which a branch only meets a limit."""
 
 _DESIGNS: Mapping[str, Callable[[Any], Iterator[NamedDesign]]] = {
@@ -134,3 +135,4 @@ _DESIGNS: Mapping[str, Callable[[Any], Iterator[NamedDesign]]] = {
     "Results": _list_results,
     "Trace": _list_trace,
 }
+"""Class of a result → function that lists the designs of its buttons."""

@@ -12,26 +12,28 @@ from tmsopt.documents.blocks import (
     Sentence,
     TableBlock,
     count_things,
-    say_whether,
+    format_bool,
 )
-from tmsopt.documents.tables import head_numbers, list_numbers, write_question
+from tmsopt.documents.tables import list_headings, list_numbers, write_question
 from tmsopt.evaluation import missed_note
 from tmsopt.fronts.front import Front
 
-_MAX_LABEL, _MAX_ROWS = 40, 20  # a brief report shows at most so many characters of a label, and points
+_MAX_LABEL = 40
+"""Maximum number of characters of a label in a brief report."""
+_MAX_ROWS = 20
+"""Maximum number of points in a brief report."""
 
 
 def write_front(front: Front, level: Level) -> Parts:
     """Write a row for each point: objectives, stability, label, free parameters, structure, active limits."""
-    unstable, points = sum(not point.stable for point in front.points), count_things(front, "point")
-    yield ", ".join(front.objectives), points, Badge(f"{unstable} not stable" if unstable else "", "bad")
+    unstable_count, points = sum(not point.stable for point in front.points), count_things(front, "point")
+    yield ", ".join(front.objectives), points, Badge(f"{unstable_count} not stable" if unstable_count else "", "bad")
     problem, full = front.problem.posed, level != "brief"
-    where = f", designs with {problem.locate}" if problem.locate else ""
-    special = ((len(front.kinks), "kink"), (len(front.gaps), "gap"))
-    counts = "".join(f"{count_things(n, word)}, " for n, word in special if n)
-    heading = f"Pareto front of {', '.join(t.strip() for t in front.objectives)}, each minimised{where}"
+    pattern = f", designs with {problem.locate}" if problem.locate else ""
+    counts = "".join(f"{count_things(n, word)}, " for n, word in ((front.kinks, "kink"), (front.gaps, "gap")) if n)
+    heading = f"Pareto front of {', '.join(t.strip() for t in front.objectives)}, each minimised{pattern}"
     effort = f"{front.solved} sub-problems; {front.seconds:.2f} s"
-    yield Sentence(f"{heading}: {count_things(front, 'point')}, {counts}{effort}", tone="answer")
+    yield Sentence(f"{heading}: {points}, {counts}{effort}", tone="answer")
     if level == "page":
         yield Chapter("picture", "Front")
         yield Figure(plots.front_figure, front, f"Front of {', '.join(front.objectives)}")
@@ -39,8 +41,8 @@ def write_front(front: Front, level: Level) -> Parts:
     yield Chapter("rows", "Points", "whole")
     labelled_rows = frozenset(k for k, p in enumerate(front.points) if p.label)
     rows = list_points(front, full)
-    objectives = len(front.objectives)
-    priorities = [9] * objectives + [7, 6] + [5] * (len(rows[0]) - objectives - 4) + [4, 3]
+    objective_count = len(front.objectives)
+    priorities = [9] * objective_count + [7, 6] + [5] * (len(rows[0]) - objective_count - 4) + [4, 3]
     yield TableBlock(rows, "Points of the front", priorities, _MAX_ROWS, labelled_rows, "--full, --csv")
     yield Chapter("notes")
     yield from (Sentence(gap.reason, "gap") for gap in front.gaps)
@@ -55,12 +57,12 @@ def list_points(front: Front, full: bool) -> list[Row]:
     problem, digits = front.problem.posed, ALL_DIGITS if full else 6
     texts = [t.strip() for t in front.objectives]
     free = [n for n in problem.free if n not in texts]
-    objective_heads, free_heads = (head_numbers(problem, names) for names in (texts, free))
+    objective_heads, free_heads = (list_headings(problem, names) for names in (texts, free))
     rows: list[Row] = [(*objective_heads, "stable", "event", *free_heads, "structure", "active limits")]
     for p in front.points:
         design = p.solution.parameters
         label = p.label if full or len(p.label) <= _MAX_LABEL else f"{p.label[: _MAX_LABEL - 1]}…"
         objectives = list_numbers(problem, texts, dict(zip(texts, p.objectives, strict=True)), design, digits)
         numbers = list_numbers(problem, free, design, design, digits)
-        rows.append((*objectives, say_whether(p.stable), label, *numbers, p.structure, ", ".join(p.limits)))
+        rows.append((*objectives, format_bool(p.stable), label, *numbers, p.structure, ", ".join(p.limits)))
     return rows

@@ -32,7 +32,7 @@ _ABOUT = (
 
 
 def write_comparison(comparison: Comparison, _level: Level) -> Parts:
-    """Write laws and numbers side by side if the model has laws, then the two formulations."""
+    """Write laws and computed numbers side by side if the model has laws, then the difference of the formulations."""
     applicable_laws = [row for row in comparison.laws if row.applies]
     agreements = sum(row.agrees is True for row in applicable_laws)
     tone: Tone = "doubt" if not applicable_laws else "good" if agreements == len(applicable_laws) else "bad"
@@ -54,9 +54,9 @@ def write_comparison(comparison: Comparison, _level: Level) -> Parts:
     if comparison.other is None:
         yield Sentence(f"none, {comparison.reason}", "other formulation")
     else:
-        names = f"{comparison.other.formulation} minus {design.formulation}"
+        heading = f"{comparison.other.formulation} minus {design.formulation}"
         differences = ((n, f"{d:.1e}") for n, d in comparison.differences.items())
-        yield TableBlock((("formulations", names), *differences), "Differences of the formulations")
+        yield TableBlock((("formulations", heading), *differences), "Differences of the formulations")
     yield from list_branches(design)
 
 

@@ -18,8 +18,8 @@ from tmsopt.documents.blocks import (
     Sentence,
     TableBlock,
     count_things,
-    judge,
-    say_whether,
+    format_bool,
+    write_verdict,
 )
 from tmsopt.documents.design_rows import convert_to_si, format_multiplicity, tabulate_parameters
 from tmsopt.documents.solution import write_bicycle, write_growth_picture
@@ -37,7 +37,8 @@ from tmsopt.search.all_designs import Coverage, Every
 if TYPE_CHECKING:
     from tmsopt.problem import Solution
 
-_FACTOR_COEFFICIENT = re.compile(r"(.*\.)?[bcdW]\d+")  # coefficients of factors, whose roots are listed instead
+_FACTOR_COEFFICIENT = re.compile(r"(.*\.)?[bcdW]\d+")
+"""Names of coefficients of factors. Documents list the roots of the factors instead."""
 
 
 def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None) -> Parts:
@@ -46,7 +47,7 @@ def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None)
     Args:
         design: the solution that was proved; a page then shows its pictures and parameters.
     """
-    verdict, stable = judge(proof.proved, "proved"), judge(proof.stable.holds, "stable")
+    verdict, stable = write_verdict(proof.proved, "proved"), write_verdict(proof.stable.holds, "stable")
     yield verdict, proof.pattern or "nothing", f"{proof.digits} digits", stable
     yield Sentence(proof.claim, verdict.text, verdict.tone)
     yield Sentence(proof.reason, "why")
@@ -82,7 +83,7 @@ def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None)
 
 
 def list_numbers(problem: Posed, proof: Proof) -> list[tuple[str, str, str, str]]:
-    """List name, decimal, radius and unit of each number that was solved for and of each root."""
+    """List the name, decimal, radius and unit of each number that was solved for and of each root."""
     return [
         (name, x.value if float(x.value) else "0", "exact" if x.radius == "0" else f"± {x.radius}", unit)
         for name, x, unit in _find_numbers(problem, proof)
@@ -106,16 +107,16 @@ def _find_numbers(problem: Posed, proof: Proof) -> Iterator[tuple[str, Number, s
         yield "  im", omega.im, ""
     listed_values = {number.value for number in proof.unknowns.values()}
     for root in () if proof.eigenfrequencies else proof.roots:
-        times = format_multiplicity(root.multiplicity)
+        multiplicity = format_multiplicity(root.multiplicity)
         if root.im.value != "0" and not root.im.value.startswith("-"):
-            yield f"pair{times}, re", root.re, rate_unit
+            yield f"pair{multiplicity}, re", root.re, rate_unit
             yield "  im ±", root.im, rate_unit
         elif root.im.value == "0" and root.re.value not in listed_values:
-            yield f"root{times}", root.re, rate_unit
+            yield f"root{multiplicity}", root.re, rate_unit
 
 
 def _find_units(problem: Posed, proof: Proof) -> dict[str, str]:
-    """Find the unit of each number; unknowns of a pattern have powers of the unit of the roots."""
+    """Map each number to its unit; unknowns of a pattern have powers of the unit of the roots."""
     units = units_of(problem)
     rate_unit = units.get("abscissa", "")
     if rate_unit and proof.unknowns:
@@ -133,10 +134,10 @@ def _describe_method(problem: Posed, proof: Proof) -> Parts:
     elif not proof.moved and proof.method != "Krawczyk":
         yield Sentence("roots of the stored design, isolated by interval arithmetic", "method")
     else:
-        equations = len(proof.unknowns) + len(proof.moved) > problem.model.degree
-        constraint_text = " and the == constraints" if equations else ""
-        equation = "a_k = a0 c_k, c_k the coefficients of the pattern"
-        yield Sentence(f"Krawczyk's interval Newton test on the equations {equation}{constraint_text}", "method")
+        has_constraints = len(proof.unknowns) + len(proof.moved) > problem.model.degree
+        equations = "a_k = a0 c_k" + (" and the == constraints" if has_constraints else "")
+        equations += ", where c_k are the coefficients of the pattern"
+        yield Sentence(f"Krawczyk's interval Newton test on the equations {equations}", "method")
         uniqueness = f"every other such design differs in some number by more than {proof.uniqueness:.2g}"
         yield f"error at most {proof.radius:.1e} before rounding to these digits; {uniqueness}"
         rounding_text = f"rounding alone can cause a difference of {proof.explained:.1e}"
@@ -147,26 +148,26 @@ def _write_facts(proof: Proof) -> Parts:
     suffix = " (of the stored design)" if proof.stored and proof.reason else ""
     shows_defect = "EP" in proof.pattern and proof.defective != NOT_CHECKED
     if shows_defect or proof.geometric_multiplicity is not None:
-        yield _write_verdict(f"defective{suffix}", proof.defective)
-    yield _write_verdict(f"stable{suffix}", proof.stable)
+        yield _write_fact(f"defective{suffix}", proof.defective)
+    yield _write_fact(f"stable{suffix}", proof.stable)
     if not proof.eigenfrequencies:
-        yield _write_verdict(f"heavily damped{suffix}", proof.heavily_damped)
-    yield _write_verdict("in the box", proof.inside)
+        yield _write_fact(f"heavily damped{suffix}", proof.heavily_damped)
+    yield _write_fact("within the ranges", proof.inside)
     yield from (Sentence(str(verdict), name) for name, verdict in proof.limits.items())
 
 
 def _write_exact_numbers(problem: Posed, proof: Proof) -> Parts:
-    """Write the numbers assumed exact, and a remark on angles."""
+    """Write the numbers that are assumed to be exact, and a remark on angles."""
     exact_values = (f"{name} = {_format_fraction(value)}" for name, value in proof.held.items())
     yield Sentence(", ".join((*exact_values, *proof.numbers)), "exact numbers")
     exact_angles = {*proof.stated, *problem.typed(problem.fixed)}
     tangents = {p.name for p in problem.parameter_set.parameters if p.tangent} - exact_angles
     if angles := [n for n in proof.held if n in tangents and proof.parameters[n].value != "0"]:
-        yield Sentence("the decimal of the double in radians, not an angle in degrees", ", ".join(angles))
+        yield Sentence("exact as the double-precision number in radians, not as degrees", ", ".join(angles))
 
 
 def _format_fraction(text: str) -> str:
-    """Write a fraction, as a decimal if that is exact and short."""
+    """Write a fraction, as a decimal if the decimal is exact and short."""
     try:
         decimal = fraction(Fraction(text), 30)
     except ValueError:  # degrees
@@ -174,44 +175,44 @@ def _format_fraction(text: str) -> str:
     return decimal.value if decimal.radius == "0" and len(decimal.value) <= len(text) + 1 else text
 
 
-def _write_verdict(label: str, verdict: Verdict) -> Sentence:
+def _write_fact(label: str, verdict: Verdict) -> Sentence:
     answer = {True: "yes", False: "no", None: "not decided"}[verdict.holds]
     return Sentence(f"{answer}, {verdict.words}", label)
 
 
 def write_every(result: Every, _level: Level) -> Parts:
-    """Write all designs with a pattern, one column each, and whether the proof or the search excludes others."""
+    """Write all designs with a pattern, each in a column, and whether a proof or a search excludes further designs."""
     solutions, coverage, proof = result.solutions, result.coverage, result.completeness
-    complete = proof is not None and proof.complete
-    verdict = Badge("proved to be all", "good") if complete else "not proved to be all"
+    is_complete = proof is not None and proof.complete
+    verdict = Badge("proved to be all", "good") if is_complete else "not proved to be all"
     yield count_things(solutions, "design"), verdict
-    count = count_things(solutions, "solution")
     effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
     if not solutions:
-        no_design = f"no design in the box and within the limits has the pattern (proved; {effort})"
-        yield Sentence(no_design if complete else "no isolated solution was found", tone="answer")
+        no_design = f"no design within the ranges and limits has the pattern (proved; {effort})"
+        yield Sentence(no_design if is_complete else "no isolated solution was found", tone="answer")
     else:
-        all_of_them = f"{count} within the ranges, no other exists (proved; {effort})"
-        located = all_of_them if complete else f"{count} within the ranges"
-        yield Sentence(located, f"locate {solutions[0].problem.locate}", "answer")
+        count_text = f"{count_things(solutions, 'solution')} within the ranges"
+        count_text += f", no other exists (proved; {effort})" if is_complete else ""
+        yield Sentence(count_text, f"locate {solutions[0].problem.locate}", "answer")
         yield Chapter("designs", width="wide")
-        yield TableBlock(_list_designs(result, complete), "Designs with the pattern")
+        yield TableBlock(_list_designs(result, is_complete), "Designs with the pattern")
     yield Chapter("proof")
     yield from _describe_proof(proof, effort) if proof else ()
     yield from _describe_coverage(coverage) if coverage else ()
 
 
-def _list_designs(result: Every, complete: bool) -> list[Row]:
+def _list_designs(result: Every, is_complete: bool) -> list[Row]:
+    """List the designs as columns: parameters, abscissa, structure, and how many starts reached each design."""
     solutions, problem = result.solutions, result.solutions[0].problem
     names = [n for n in solutions[0].parameters if n in problem.free]
     pairs = [*zip(solutions, result.errors or [{} for _ in solutions], strict=True)]
     units = [unit_at(problem.posed, "abscissa", s.parameters) for s in solutions]
     rows: list[Row] = [("design", *(str(k) for k in range(1, len(solutions) + 1)))]
     rows += [(n, *(Cell(s.parameters[n], error=e.get(n, 0.0)) for s, e in pairs)) for n in names]
-    decays = [Cell(s.abscissa, u, error=e.get("abscissa", 0.0)) for (s, e), u in zip(pairs, units, strict=True)]
-    rows += [(f"abscissa {units[0].text}".rstrip(), *decays), ("structure", *(s.structure for s in solutions))]
-    rows += [("met", *map(str, result.coverage.hits))] if result.coverage else []
-    rows += [("proved", *map(say_whether, result.proved))] if any(result.proved) and not complete else []
+    abscissas = [Cell(s.abscissa, u, error=e.get("abscissa", 0.0)) for (s, e), u in zip(pairs, units, strict=True)]
+    rows += [(f"abscissa {units[0].text}".rstrip(), *abscissas), ("structure", *(s.structure for s in solutions))]
+    rows += [("starts that reached it", *map(str, result.coverage.hits))] if result.coverage else []
+    rows += [("proved", *map(format_bool, result.proved))] if any(result.proved) and not is_complete else []
     return rows
 
 
@@ -223,18 +224,19 @@ def _describe_proof(proof: Completeness, effort: str) -> Iterator[str]:
         return
     proved_text = f"; {len(proof.designs)} proved" if proof.designs else ""
     yield f"no proof that these are all: {proof.reason}{f' ({effort}{proved_text})' if proof.boxes else ''}"
-    for place in proof.undecided:
-        yield f"undecided: {', '.join(f'{n} {Cell(lo)} … {Cell(hi)}' for n, (lo, hi) in place.ranges.items())}"
+    for box in proof.undecided:
+        yield f"undecided: {', '.join(f'{n} {Cell(lo)} … {Cell(hi)}' for n, (lo, hi) in box.ranges.items())}"
 
 
 def _describe_coverage(coverage: Coverage) -> Iterator[str]:
     if coverage.crossings:
-        yield f"{coverage.crossings} starts ended where roots meet in a {CROSSING}"
-    singular = f"; {coverage.singular} ended at designs with the pattern where its equations are singular: "
-    singular += "one of a continuum of solutions, or one where two meet (tmsopt solve shows one)"
-    doubt = singular if coverage.singular else ""
+        yield f"{coverage.crossings} starts ended at designs whose roots meet in a {CROSSING}"
+    singular_text = (
+        f"; {coverage.singular} ended at designs with the pattern where its equations are singular, because "
+    )
+    singular_text += "the solutions form a continuum or two of them meet (tmsopt solve shows such a design)"
     yield (
-        f"coverage of a search: {coverage.starts} starts over the box{doubt}; "
+        f"coverage of a search: {coverage.starts} starts over the ranges{singular_text if coverage.singular else ''}; "
         f"{coverage.expected:.2f} solutions are expected in total; "
         f"the chance that one more start finds another is below {coverage.chance:.2g} (95 % confidence; no proof)"
     )

@@ -44,7 +44,7 @@ _RESULTS = {
 The module has a generator for each class, such as `write_solution`. It is imported at its first use.
 """
 
-HOME = {name: module for module, names in _RESULTS.items() for name in names}
+MODULE_BY_CLASS = {name: module for module, names in _RESULTS.items() for name in names}
 """Class of a result → the module that writes its document."""
 
 ENDINGS = ("html", "htm")
@@ -57,9 +57,9 @@ def document_of(result: Any, level: Level = "brief", **options: Any) -> Document
     """Build the document of a result.
 
     Args:
-        options: options of its `write_` function, such as `si` of `write_solution`.
+        options: options of the function that writes the document, such as `si` of `write_solution`.
     """
-    cover, parts = _open(result, level, **options)
+    document, parts = _begin_document(result, level, **options)
     blocks: list[Block] = []
     chapters = {Chapter("answer"): blocks}
     for part in parts:
@@ -72,23 +72,23 @@ def document_of(result: Any, level: Level = "brief", **options: Any) -> Document
                 blocks.append(Sentence(part))
             case _:
                 blocks.append(part)
-    filled = (replace(chapter, blocks=tuple(blocks)) for chapter, blocks in chapters.items() if blocks)
-    return replace(cover, sections=tuple(filled))
+    filled_chapters = (replace(chapter, blocks=tuple(blocks)) for chapter, blocks in chapters.items() if blocks)
+    return replace(document, chapters=tuple(filled_chapters))
 
 
-def _open(result: Any, level: Level, **options: Any) -> tuple[Document, Parts]:
-    """Return the document without its chapters, and a generator of their parts."""
+def _begin_document(result: Any, level: Level, **options: Any) -> tuple[Document, Parts]:
+    """Return the document without its chapters, and a generator of the chapters and their blocks."""
     name = type(result).__name__
-    module: Any = import_module(f"tmsopt.documents.{HOME[name]}")
+    module: Any = import_module(f"tmsopt.documents.{MODULE_BY_CLASS[name]}")
     parts = getattr(module, f"write_{name.lower()}")(result, level, **options)
-    words = [Badge(word) if isinstance(word, str) else word for word in next(parts)]
-    return Document(name, title_of(result), tuple(word for word in words if word.text), level), parts
+    badges = [Badge(badge) if isinstance(badge, str) else badge for badge in next(parts)]
+    return Document(name, title_of(result), tuple(badge for badge in badges if badge.text), level), parts
 
 
 def picture_of(result: Any) -> str:
     """Return the name of the function in `tmsopt.plots` that draws a result; empty if it has no picture."""
     name = type(result).__name__
-    return _RESULTS[HOME[name]][name]
+    return _RESULTS[MODULE_BY_CLASS[name]][name]
 
 
 def report(result: Any, full: bool = False) -> str:
@@ -98,8 +98,8 @@ def report(result: Any, full: bool = False) -> str:
 
 def headline(result: Any) -> str:
     """Write the kind of a result, how its computation ended, and its title as far as it fits, in one line."""
-    cover, _ = _open(result, "brief")
-    return to_headline(cover)
+    document, _ = _begin_document(result, "brief")
+    return to_headline(document)
 
 
 def title_of(result: Any) -> str:
@@ -141,16 +141,16 @@ def plot(result: Any, ax: "Axes | None" = None) -> "Axes":
         import matplotlib.pyplot as plt
         from matplotlib._pylab_helpers import Gcf
 
-        blank = plt.figure()
-        number, canvas = blank.number, type(blank.canvas)
-        plt.close(blank)
+        empty_figure = plt.figure()
+        number, canvas = empty_figure.number, type(empty_figure.canvas)
+        plt.close(empty_figure)
         figure: Any = axes.get_figure()
         Gcf._set_new_active_manager(canvas.new_manager(figure, number))
     return axes
 
 
 def to_notebook(result: Any) -> str:
-    """Write a result for a notebook: its words, its brief document and its picture."""
+    """Write a result for a notebook: its badges, its brief document and its picture."""
     from tmsopt.documents.html import to_fragment
 
     options: dict[str, Any] = {"tabulated": True} if type(result).__name__ == "Solution" else {}
@@ -171,13 +171,13 @@ def save_report(
     """Write a result as one page: the answer, pictures, tables, the explorer, the report as text, and its origin.
 
     Args:
-        path: ends in html or htm.
+        path: the file to write; its name ends in html or htm.
         command: the command that computed the result, as typed.
         files: name → text of the files that state the problem.
         seed: random seed of the starts.
-        full: whether to include slow analyses: active limits moved and solved again, and every number of the report.
+        full: whether to include slow analyses, such as a new solution for each active limit, and all numbers.
         design: the solution that a proof is about, for pictures and the explorer.
-        progress: called with a `tmsopt.Progress` now and then.
+        progress: is called with a `tmsopt.Progress` from time to time.
 
     Raises:
         InputError: if `result` is not a result, or if `path` has another ending.
@@ -193,11 +193,11 @@ def save_report(
 
     More: docs/how_to/hand_on.md
     """
-    if type(result).__name__ not in HOME:
+    if type(result).__name__ not in MODULE_BY_CLASS:
         raise InputError([Fault(f"found {short(result)}; accepted: a result, such as a solution", ("result",))])
-    place = as_path(path, "the file to write")
-    if place.suffix.lstrip(".").lower() not in ENDINGS:
-        raise InputError([Fault(f"found '{place}'; accepted: a file name ending in {', '.join(ENDINGS)}", ("path",))])
+    file = as_path(path, "the file to write")
+    if file.suffix.lstrip(".").lower() not in ENDINGS:
+        raise InputError([Fault(f"found '{file}'; accepted: a file name ending in {', '.join(ENDINGS)}", ("path",))])
     from tmsopt.documents.explored import frame_explorer
     from tmsopt.documents.html import mark_verbatim, to_page
 
@@ -208,26 +208,28 @@ def save_report(
         steps(1, math.nan, "the document is done")
     text = mark_verbatim(report(result, full), "report as text")
     origin = _mark_origin({"command": command, **(files or {})}, getattr(getattr(result, "study", None), "seed", seed))
-    extra_sections = (
+    extra_chapters = (
         (Chapter("explorer", width="whole"), frame_explorer(result, design)),
         (Chapter("text", "As text", "whole"), f"<details><summary>The report as text</summary>{text}</details>"),
         (Chapter("origin", "Origin", "whole"), origin),
     )
-    write_text(place, to_page(document, extra_sections))
+    write_text(file, to_page(document, extra_chapters))
 
 
 def _mark_origin(texts: Mapping[str, str], seed: int | None) -> str:
     """Mark up versions, system, date and seed, then the command and the files."""
     from tmsopt.documents.html import escape_text, mark_list, mark_verbatim
 
-    about = {name: version or "" for name, version in installed_versions(_PACKAGES).items()} | {
+    facts = {name: version or "" for name, version in installed_versions(_PACKAGES).items()} | {
         "Python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}".strip(),
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "seed": "" if seed is None else str(seed),
     }
-    marked = (f"<h3>{escape_text(name)}</h3>\n{mark_verbatim(text, name)}" for name, text in texts.items() if text)
-    return mark_list(about.items()) + "\n".join(marked)
+    marked_texts = (
+        f"<h3>{escape_text(name)}</h3>\n{mark_verbatim(text, name)}" for name, text in texts.items() if text
+    )
+    return mark_list(facts.items()) + "\n".join(marked_texts)
 
 
 def response(solution: Any, **options: Any) -> Any:

@@ -1,10 +1,10 @@
 """Documents on the distances from a design to the boundaries of stability."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from tmsopt.boundaries.nearest import Nearest, Robustness
-from tmsopt.documents.blocks import Cell, Chapter, Level, Parts, Sentence, TableBlock, judge
+from tmsopt.documents.blocks import Cell, Chapter, Level, Parts, Sentence, TableBlock, write_verdict
 from tmsopt.models import Model, in_words_of, words_of
 from tmsopt.problem.unit_system import unit_of
 
@@ -16,27 +16,32 @@ _ZERO_SHARE = 1e-3
 """A change that is less than this share of the largest change is shown as 0."""
 _MAX_NAMES = 3
 """Maximum number of parameters that the headline names."""
-_OF_H = {"weave": "a real eigenfrequency"}
-_ON_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
+_EDGE_OF_H = {"weave": "a real eigenfrequency"}
+_EDGE = {"weave": "a pair of roots on the imaginary axis", "capsize": "a root 0", "infinity": "a root at infinity"}
+"""Kind of boundary → what a design on this boundary has; for a complex H, `_EDGE_OF_H`."""
 
 
 def write_robustness(robustness: Robustness, _level: Level) -> Parts:
     """Write one sentence, then the nearest point of every boundary."""
     radius = _format_value("radius" if robustness.stable else "to stability", robustness.limit.distance)
-    yield judge(robustness.stable, "stable"), radius, f"to {robustness.limit.kind}" if robustness.limit.found else ""
+    yield (
+        write_verdict(robustness.stable, "stable"),
+        radius,
+        f"to {robustness.limit.kind}" if robustness.limit.found else "",
+    )
     yield Sentence(describe_robustness(robustness), "robustness", "answer")
     yield Chapter("boundaries")
-    yield tabulate_boundaries(robustness)
+    yield from tabulate_boundaries(robustness)
 
 
 def describe_robustness(robustness: Robustness, on_edge: bool = False) -> str:
     """Describe the smallest change that makes a design unstable (or stable), its cause, and its main parameters.
 
     Args:
-        on_edge: whether the ideal design is on the edge of stability; its stored numbers may miss it.
+        on_edge: whether the ideal design is on the edge of stability; its rounded numbers may lie next to the edge.
     """
     if robustness.edges:
-        edge = _ON_EDGE if robustness.problem.model.carrier is None else _OF_H
+        edge = _EDGE if robustness.problem.model.carrier is None else _EDGE_OF_H
         edge_names = " and ".join(edge[kind] for kind in robustness.edges)
         if robustness.zeros:
             zeros = ", ".join(f"{n} = 0" for n in robustness.zeros)
@@ -53,61 +58,60 @@ def describe_robustness(robustness: Robustness, on_edge: bool = False) -> str:
     return f"{_describe_size(robustness)}{_name_largest(limit)} makes it unstable ({cause})"
 
 
-def tabulate_boundaries(robustness: Robustness) -> TableBlock:
-    """Tabulate the nearest point of every boundary: its distance and the change of each parameter."""
+def tabulate_boundaries(robustness: Robustness) -> Iterator[TableBlock]:
+    """Tabulate the nearest point of every boundary: its distance and the changes, then the values of the parameters."""
     names, model = list(robustness.weights), robustness.problem.model
-    kinds: tuple[Nearest, ...] = (robustness.weave, robustness.capsize, robustness.infinity, robustness.heavy_damping)
+    boundaries = (robustness.weave, robustness.capsize, robustness.infinity, robustness.heavy_damping)
     units = {name: unit_of(robustness.problem.posed, name) for name in names}
-    rows: list[Sequence[str]] = [
-        ("relative changes" if robustness.relative else "changes over weights", "distance", *names)
-    ]
-    places: list[Sequence[str]] = []
-    for n in kinds if model.carrier is None else kinds[:1]:
-        distance = "0" if n.found else "none found"
-        moves = ["" for _ in names]
-        if n.found and n.distance > 0:
-            distance = _format_percent(n.distance) if robustness.relative else f"{n.distance:.4g}"
-            moves = _format_moves(n, robustness.relative)
-            places.append(
-                (
-                    f"values at {_name_place(n, model)}",
-                    "",
-                    *(units[name].show(n.parameters[name], 8) for name in names),
-                )
-            )
-        rows.append((_name_row(n, robustness), distance, *moves))
-    rows += [("weight of a change", "", *(units[name].show(robustness.weights[name], 6) for name in names)), *places]
-    is_transposed = len(names) > _MAX_COLUMNS
-    return TableBlock(list(zip(*rows, strict=True)) if is_transposed else rows, "Nearest points of the boundaries")
+    heading = "relative changes" if robustness.relative else "changes divided by weights"
+    changes: list[Sequence[str]] = [(heading, "distance", *names)]
+    weights = (units[name].show(robustness.weights[name], 6) for name in names)
+    values: list[Sequence[str]] = [("values", *names), ("weights, which divide the changes", *weights)]
+    for nearest in boundaries if model.carrier is None else boundaries[:1]:
+        distance = "0" if nearest.found else "none found"
+        cells = ["" for _ in names]
+        if nearest.found and nearest.distance > 0:
+            distance = _format_percent(nearest.distance) if robustness.relative else f"{nearest.distance:.4g}"
+            cells = _format_changes(nearest, robustness.relative)
+            point = (units[name].show(nearest.parameters[name], 8) for name in names)
+            values.append((f"nearest point with {_name_boundary(nearest, model)}", *point))
+        changes.append((_name_row(nearest, robustness), distance, *cells))
+    for rows, caption in (
+        (changes, "Smallest changes to the boundaries"),
+        (values, "Nearest points of the boundaries"),
+    ):
+        yield TableBlock(list(zip(*rows, strict=True)) if len(names) > _MAX_COLUMNS else rows, caption)
 
 
 def write_nearest(nearest: Nearest, _level: Level) -> Parts:
-    """Write the distance to one boundary, then its nearest point and the change of each parameter in weights."""
+    """Write the distance to one boundary, then its nearest point and the change of each parameter over its weight."""
     yield nearest.kind, _format_value("distance", nearest.distance) if nearest.found else "none found"
     if not nearest.found:
         yield f"no point of the boundary of {nearest.kind} was found"
         return
-    crossing = "" if nearest.refined else ", the nearest crossing seen"
-    yield Sentence(f"{nearest.distance:.6g} in weights{crossing}", f"to {nearest.kind}", "answer")
+    doubt = "" if nearest.refined else ", to the nearest crossing found"
+    yield Sentence(
+        f"{nearest.distance:.6g} (changes are divided by weights){doubt}", f"distance to {nearest.kind}", "answer"
+    )
     yield Chapter("boundary")
     rows = [(n, Cell(nearest.parameters[n], digits=8), f"{change:+.4g}") for n, change in nearest.direction.items()]
-    yield TableBlock((("", "there", "change in weights"), *rows), "Nearest point of the boundary")
+    yield TableBlock((("parameter", "value", "change divided by weight"), *rows), "Nearest point of the boundary")
 
 
-def _name_place(n: Nearest, model: Model) -> str:
-    return "a root at infinity" if n.kind == "infinity" else in_words_of(model, n.kind)
+def _name_boundary(nearest: Nearest, model: Model) -> str:
+    return "a root at infinity" if nearest.kind == "infinity" else in_words_of(model, nearest.kind)
 
 
-def _name_row(n: Nearest, robustness: Robustness) -> str:
-    if n.kind == "heavy damping":
-        return f"change {'out of' if robustness.heavily_damped else 'into'} {n.kind}"
-    return f"change to reach {_name_place(n, robustness.problem.model)}"
+def _name_row(nearest: Nearest, robustness: Robustness) -> str:
+    if nearest.kind == "heavy damping":
+        return f"change {'out of' if robustness.heavily_damped else 'into'} {nearest.kind}"
+    return f"change to reach {_name_boundary(nearest, robustness.problem.model)}"
 
 
-def _format_moves(n: Nearest, relative: bool) -> list[str]:
+def _format_changes(nearest: Nearest, relative: bool) -> list[str]:
     """List the change of each parameter; a negligible change is 0."""
-    largest = max(map(abs, n.direction.values()))
-    changes = (x if abs(x) >= _ZERO_SHARE * largest else 0.0 for x in n.direction.values())
+    largest = max(map(abs, nearest.direction.values()))
+    changes = (x if abs(x) >= _ZERO_SHARE * largest else 0.0 for x in nearest.direction.values())
     return ["0" if x == 0 else _format_percent(x, "+") if relative else f"{x:+.3g}" for x in changes]
 
 

@@ -1,4 +1,4 @@
-"""The report of a solution: the answer, then the design, its motion, its limits, robustness, and further commands."""
+"""The report of a solution: the answer, the design, its motion, its limits, its robustness, and further commands."""
 
 import math
 from collections.abc import Iterator
@@ -21,27 +21,27 @@ from tmsopt.documents.blocks import (
     count_things,
 )
 from tmsopt.documents.design_rows import (
-    BRIEF,
+    BRIEF_DIGITS,
     PERCENT,
     convert_to_si,
+    describe_abscissas,
     describe_inertia,
     describe_loads,
     describe_motion,
     describe_pitching,
     describe_roots,
     describe_speed,
-    describe_stored,
-    head_other_form,
     list_cases,
     list_parameters,
     list_quantities,
     parameters_of_worst_case,
     tabulate_parameters,
+    write_other_heading,
 )
 from tmsopt.documents.explanation import describe_rounding, tabulate_rounding, write_diagnosis, write_optimality
 from tmsopt.documents.motion import describe_range
 from tmsopt.documents.robustness import describe_robustness, tabulate_boundaries
-from tmsopt.documents.tables import without_empty_columns
+from tmsopt.documents.tables import remove_empty_columns
 from tmsopt.evaluation import abscissa_as_stored
 from tmsopt.guide import describe
 from tmsopt.models import tms
@@ -52,13 +52,18 @@ from tmsopt.problem.verdict.stability import ROUNDED, STABLE, UNSTABLE
 from tmsopt.problem.verdict.status import describe_status, describe_verdict
 from tmsopt.records import Numbers
 
-_FOLD, _MAX_FIXED = 5, 14  # in a brief report, free parameters in one column, and the most fixed parameters named
-_MAX_LIMITS = 3  # a brief report shows at most so many limits
-_OTHER = {"a0": "must not be 0", "coefficients": "must have values"}
+_FOLD = 5
+"""With more free parameters, a brief report lists them in several columns."""
+_MAX_FIXED = 14
+"""Maximum number of fixed parameters that a brief report names."""
+_MAX_LIMITS = 3
+"""Maximum number of limits in a brief report."""
+_REQUIREMENTS = {"a0": "must not be 0", "coefficients": "must have values"}
+"""Name of a violation that is no constraint → what is required."""
 
 
 def _summarise(solution: Solution) -> tuple[Badge | str, ...]:
-    """Return the words of the headline: status, objective, structure, proof, stability."""
+    """Return the badges of the headline: status, objective, structure, proof, stability."""
     problem, stability = solution.problem.posed, solution.stability
     objective = problem.minimize or problem.maximize
     name, value = (objective, solution.value) if objective else ("abscissa", solution.abscissa)
@@ -71,7 +76,7 @@ def _summarise(solution: Solution) -> tuple[Badge | str, ...]:
         f"misses {amounts_text(problem, solution.missed)}" if solution.missed else "",
         solution.structure,
         Badge("proved" if solution.bound.proven else "", "good"),
-        Badge(f"{stability.verdict}{growth}{rounded}" if stability.verdict else "", judge_tone(solution)),
+        Badge(f"{stability.verdict}{growth}{rounded}" if stability.verdict else "", choose_tone(solution)),
     )
 
 
@@ -86,8 +91,8 @@ def write_solution(
     """Write the parts of the report in order.
 
     Args:
-        full: whether a page includes slow analyses.
-        si: parameters in SI for another scale, as from `si_parameters`. If given, a brief report shows them.
+        full: whether a page, too, includes slow analyses.
+        si: parameters in SI for a scale of your own, as from `convert_to_si`; a brief report then shows them, too.
         tabulated: whether a brief report, too, lists every parameter with its meaning.
     """
     yield _summarise(solution)
@@ -111,21 +116,21 @@ def write_solution(
     yield Chapter("limits", width="wide")
     yield from _write_limits(solution, explanation, full, page)
     if not brief:
-        yield Chapter("sureness", "Robustness, rounding and optimality")
-    yield from _write_sureness(solution, explanation, brief, full)
+        yield Chapter("robustness", "Robustness, rounding and optimality")
+    yield from _write_robustness(solution, explanation, brief, full)
     if brief:
         yield _suggest_more(solution, analysis)
         return
     if full:
         yield Chapter("roots")
         if solution.multiple_as_rounded:
-            yield "roots coincide up to rounding errors; tmsopt prove decides it for the numbers as typed"
+            yield "roots coincide up to rounding errors; tmsopt prove decides whether they coincide exactly"
         for diagnosis in analysis.diagnoses:
             yield from write_diagnosis(diagnosis)
     yield Chapter("quantities", "Derived quantities", "wide")
-    head = ("quantity", "value", "unit", head_other_form(solution, si_parameters), "meaning")
+    head = ("quantity", "value", "unit", write_other_heading(solution, si_parameters), "meaning")
     rows = (head, *list_quantities(solution, si_parameters))
-    yield TableBlock(without_empty_columns(rows), "Quantities of the design")
+    yield TableBlock(remove_empty_columns(rows), "Quantities of the design")
     yield Chapter("search")
     yield from _write_search(solution)
 
@@ -165,10 +170,11 @@ def write_headline(solution: Solution) -> tuple[Sentence, Sentence]:
     structure = structure_line(problem, solution.structure, solution.abscissa, solution.meetings)
     structure += ROUNDED if solution.multiple_as_rounded else ""
     facts = "; ".join(part for part in (located, objective_text, abscissa_as_stored(solution), structure) if part)
-    return Sentence(verdict, tone=judge_tone(solution)), Sentence(facts, tone="answer")
+    return Sentence(verdict, tone=choose_tone(solution)), Sentence(facts, tone="answer")
 
 
-def judge_tone(solution: Solution) -> Tone:
+def choose_tone(solution: Solution) -> Tone:
+    """Choose the tone of the verdict on a solution."""
     if solution.status != "optimal" or solution.stability.verdict == UNSTABLE:
         return "bad"
     return "good" if solution.stability.verdict == STABLE else "doubt"
@@ -176,22 +182,22 @@ def judge_tone(solution: Solution) -> Tone:
 
 def _write_answer(solution: Solution, analysis: Analysis, brief: bool, full: bool) -> Parts:
     verdict, facts = write_headline(solution)
-    obstacles, further = analysis.obstacles
+    obstacles, further_obstacles = analysis.obstacles
     if solution.status == "infeasible":
-        is_joined = ": " not in verdict.text and obstacles
+        is_joined = obstacles and ": " not in verdict.text  # the first obstacle follows the verdict on the same line
         yield Sentence(f"{verdict.text}: {obstacles[0]}" if is_joined else verdict.text, tone="bad")
         yield from obstacles[1:] if is_joined else obstacles
         for name, value in solution.violations.items():
             unit = unit_of(solution.problem.posed, name)
             excess = f" by {unit.show(value, 4)}" if math.isfinite(value) else ", which has no value"
-            excess = "" if name in _OTHER else excess
+            excess = "" if name in _REQUIREMENTS else excess
             yield Sentence(f"{name} ({_describe_limit(solution, name)}){excess}", "violated")
         yield Sentence(facts.text, "nearest design")
     else:
         yield verdict
         yield facts
         yield from obstacles
-    yield from further if full else ()
+    yield from further_obstacles if full else ()
     yield Sentence(proof_line(solution), "proof")
     if brief:
         active = (f"{name} ({_describe_limit(solution, name)})".removesuffix(" ()") for name in solution.active)
@@ -200,16 +206,16 @@ def _write_answer(solution: Solution, analysis: Analysis, brief: bool, full: boo
 
 def _describe_limit(solution: Solution, name: str) -> str:
     problem = solution.problem.posed
-    return limit_text(problem, name) or ("pattern" if name in problem.located else _OTHER.get(name, ""))
+    return limit_text(problem, name) or ("pattern" if name in problem.located else _REQUIREMENTS.get(name, ""))
 
 
 def _write_design(solution: Solution, si: Numbers, brief: bool, shows_si: bool) -> Parts:
-    """Write all parameters in a table; if brief, the free ones side by side and the fixed ones in a sentence."""
+    """Write all parameters in a table; if brief, only the free parameters, and the fixed parameters in a sentence."""
     if not brief:
         yield tabulate_parameters(solution, si)
         return
     listed = [*list_parameters(solution, si, brief=True)]
-    rows = [(name, cell, also if shows_si else "") for name, cell, role, also, _ in listed if role == "free"]
+    rows = [(name, cell, si_text if shows_si else "") for name, cell, role, si_text, _ in listed if role == "free"]
     if rows:
         yield TableBlock((("", "", ""), *rows), fold=_FOLD, tone="answer")
     fixed_parameters = [f"{name} = {cell}" for name, cell, role, *_ in listed if role == "fixed"]
@@ -219,25 +225,25 @@ def _write_design(solution: Solution, si: Numbers, brief: bool, shows_si: bool) 
 
 
 def _write_motion(solution: Solution, analysis: Analysis, brief: bool) -> Parts:
-    at = describe_speed(solution, solution.worst)
-    yield Sentence(f"{f'at {at}: ' if at else ''}{describe_motion(solution)}", "motion")
+    speed = describe_speed(solution, solution.worst)
+    yield Sentence(f"{f'at {speed}: ' if speed else ''}{describe_motion(solution)}", "motion")
     if analysis.stable_speeds is not None:
         yield describe_range(analysis.stable_speeds, solution)
-    label, text = describe_roots(solution, BRIEF)
+    label, text = describe_roots(solution, BRIEF_DIGITS)
     yield Sentence(text, label)
     if not brief:
-        yield from describe_stored(solution)
+        yield from describe_abscissas(solution)
     if "load_rear" in solution.quantities:
         yield Sentence(f"{describe_loads(solution)}; {describe_pitching(solution)}", "loads")
     yield Sentence(solution.problem.model.omits, "model")
-    inertia = "largest stable inertia, one at a time (radius of gyration)"
-    yield Sentence(describe_inertia(solution), inertia)
+    label = "largest moments of inertia of a stable design, each alone (radius of gyration)"
+    yield Sentence(describe_inertia(solution), label)
 
 
 def _write_cases(solution: Solution, worst: Case) -> Parts:
     """Write the worst case, other extreme cases, and a bound for all cases."""
     problem, cover, least_damped, fastest = solution.problem, solution.cover, solution.least_damped, solution.fastest
-    case_text = "objective, motion and roots belong to this case, all else to the nominal design"
+    case_text = "objective, motion and roots belong to this case, all other lines to the nominal design"
     yield Sentence(f"{_describe_case(problem, worst)}; {case_text}", "worst case")
     if least_damped not in (None, worst) and problem.model.carrier is None:
         label = "least damped case found" if problem.tolerances else "least damped case"
@@ -263,7 +269,7 @@ def _describe_case(problem: Problem, case: Case) -> str:
 def _write_limits(solution: Solution, explanation: Explanation | None, full: bool, page: bool) -> Parts:
     names = dict.fromkeys((*solution.problem.constraints, *solution.violations))
     if page and names:
-        rows = ((n, _describe_limit(solution, n), _describe_standing(solution, n)) for n in names)
+        rows = ((n, _describe_limit(solution, n), _describe_limit_status(solution, n)) for n in names)
         yield TableBlock((("limit", "condition", "status"), *rows), "Limits and their status")
     if explanation is None:
         return
@@ -275,11 +281,11 @@ def _write_limits(solution: Solution, explanation: Explanation | None, full: boo
     yield from (Sentence(text, "warning", "doubt") for text in explanation.warnings)
 
 
-def _describe_standing(solution: Solution, name: str) -> str:
+def _describe_limit_status(solution: Solution, name: str) -> str:
     """Describe whether a limit holds, is active or is violated."""
     if name in solution.violations:
-        by, unit = solution.violations[name], unit_of(solution.problem.posed, name)
-        return f"violated by {unit.show(by, 4)}" if math.isfinite(by) else "has no value"
+        excess, unit = solution.violations[name], unit_of(solution.problem.posed, name)
+        return f"violated by {unit.show(excess, 4)}" if math.isfinite(excess) else "has no value"
     return "active" if name in solution.active else f"holds{_describe_margin(solution, name)}"
 
 
@@ -302,7 +308,7 @@ def _describe_margin(solution: Solution, name: str) -> str:
 
 
 def _list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
-    """List name and text of an active limit, a small relaxation of it, and the improvement to first order."""
+    """List the name and the text of an active limit, a small relaxation, and the improvement to first order."""
     limit = limit_text(solution.problem.posed, lever.name)
     if not lever.step:
         return lever.name, limit, "a physical limit", ""
@@ -310,12 +316,12 @@ def _list_lever(solution: Solution, lever: Lever) -> tuple[str, ...]:
     return lever.name, limit, step, lever.gained.show(lever.predicted, 3)
 
 
-def _write_sureness(solution: Solution, explanation: Explanation | None, brief: bool, full: bool) -> Parts:
+def _write_robustness(solution: Solution, explanation: Explanation | None, brief: bool, full: bool) -> Parts:
     robustness = solution.analysis.boundaries if full else solution.analysis.robustness
     if robustness is not None:
         yield Sentence(describe_robustness(robustness, solution.stability.on_edge), "robustness")
         if full:
-            yield tabulate_boundaries(robustness)
+            yield from tabulate_boundaries(robustness)
     if explanation is not None and explanation.precision:
         yield Sentence(describe_rounding(explanation), "rounding")
         if not brief:
@@ -326,15 +332,15 @@ def _write_sureness(solution: Solution, explanation: Explanation | None, brief: 
 
 
 def _write_search(solution: Solution) -> Parts:
-    free, starts, problem = solution.freedom, solution.starts, solution.problem
-    if problem.locate:
-        parameters, conditions = count_things(free.free, "free parameter"), count_things(free.conditions, "condition")
-        yield Sentence(f"{free.kind}, {parameters} and {conditions}", "freedom")
+    freedom, starts = solution.freedom, solution.starts
+    if solution.problem.locate:
+        parameters = count_things(freedom.free, "free parameter")
+        yield Sentence(f"{freedom.kind}, {parameters} and {count_things(freedom.conditions, 'condition')}", "freedom")
     yield from list_branches(solution)
     if starts.tried:
         skipped_count = starts.tried - starts.runs
         skipped_text = (
-            f" ({skipped_count} not run but counted, as they lead to a known optimum)"
+            f" ({skipped_count} counted but not run, because they lead to a known optimum)"
             if starts.runs and skipped_count
             else ""
         )
@@ -349,15 +355,15 @@ def list_branches(solution: Solution) -> Iterator[str]:
     """List other designs that solve the same equations, and the limits that exclude them."""
     problem = solution.problem.posed
     for branch in solution.branches:
-        where = ", ".join(f"{n} = {unit_of(problem, n).show(branch.parameters[n], ALL_DIGITS)}" for n in problem.free)
-        yield f"also solved by {where}; excluded by {', '.join(branch.excluded_by) or 'nothing'}"
+        design = ", ".join(f"{n} = {unit_of(problem, n).show(branch.parameters[n], ALL_DIGITS)}" for n in problem.free)
+        yield f"also solved by {design}; excluded by {', '.join(branch.excluded_by) or 'nothing'}"
 
 
 def _suggest_more(solution: Solution, analysis: Analysis) -> Sentence:
     """Suggest --full, and the commands that apply to the same file."""
-    problem, solved = solution.problem.posed, solution.status == "optimal"
+    problem = solution.problem.posed
     commands = {
-        "prove": solved,
+        "prove": solution.status == "optimal",
         "compare": problem.model is tms,
         "speeds": analysis.stable_speeds is not None,
         "chart": len(problem.free) in (2, 3),

@@ -14,22 +14,24 @@ from tmsopt.documents.blocks import (
     Sentence,
     TableBlock,
     count_things,
-    say_whether,
+    format_bool,
 )
-from tmsopt.documents.tables import head_numbers, list_numbers, thin_rows, write_question
+from tmsopt.documents.tables import list_headings, list_numbers, thin_rows, write_question
 from tmsopt.problem import show_at, status_text, unit_of
 from tmsopt.studies.rows import Row
 from tmsopt.studies.run import Results
 from tmsopt.studies.study import Study
 from tmsopt.studies.summary import Share, Summary
 
-FULL_ROWS = 40
+_MAX_FULL_ROWS = 40
 """Maximum number of rows of a full report."""
 
-_BRIEF_ROWS = 10  # maximum number of rows of a brief report
+_MAX_BRIEF_ROWS = 10
+"""Maximum number of rows of a brief report."""
 _MAX_CAUSES = 5
 _DIGITS = 6
-_SHARES = {"stable": "stable", "feasible": "every constraint met", "good": "both"}
+_SHARES = {"stable": "stable", "feasible": "every constraint met", "good": "stable, and every constraint met"}
+"""Name of a share of the rows → its label."""
 
 
 def write_results(results: Results, level: Level) -> Parts:
@@ -38,15 +40,15 @@ def write_results(results: Results, level: Level) -> Parts:
     study, summary, page = results.study, results.summary, level == "page"
     yield Sentence(_describe_study(study, summary), tone="answer")
     if page:
-        random = study.method == "monte_carlo"
-        caption = "How the designs are distributed" if random else "The objective over what varies"
+        is_random = study.method == "monte_carlo"
+        caption = "Distribution of the designs" if is_random else "The objective over the varied parameters"
         yield Chapter("picture", "All rows")
         yield Figure(plots.draw_histogram, results, caption)
         rows, notes = thin_rows(results.rows, "rows", "tmsopt study FILE --export rows.csv writes all")
     else:
-        rows = [*islice(results.rows, _BRIEF_ROWS if level == "brief" else FULL_ROWS)]
-        hidden = summary.rows > len(rows) > 0
-        notes = [f"… {summary.rows} rows in all; --export rows.csv writes them"] if hidden else []
+        rows = [*islice(results.rows, _MAX_BRIEF_ROWS if level == "brief" else _MAX_FULL_ROWS)]
+        has_hidden_rows = summary.rows > len(rows) > 0
+        notes = [f"… {summary.rows} rows in all; --export rows.csv writes them"] if has_hidden_rows else []
     yield Chapter("rows", width="whole")
     if rows:
         cells = list_rows(study, rows)
@@ -73,8 +75,8 @@ def _describe_study(study: Study, summary: Summary) -> str:
         names = " × ".join(f"{name} ({size})" for name, size in study.grid_shape.items())
     method_text = f"{study.method.replace('_', ' ')} over {names}: {summary.rows} rows"
     counts = ", ".join(_count_statuses(study, summary))
-    missing = summary.rows - sum(summary.counts.values())
-    return f"{method_text}; {counts or 'none solved'}" + (f", {missing} not yet solved" if missing else "")
+    missing_count = summary.rows - sum(summary.counts.values())
+    return f"{method_text}; {counts or 'none solved'}" + (f", {missing_count} not yet solved" if missing_count else "")
 
 
 def _count_statuses(study: Study, summary: Summary) -> list[str]:
@@ -96,10 +98,10 @@ def list_rows(study: Study, rows: Sequence[Row]) -> list[TableRow]:
         row_values |= dict.fromkeys(objectives, row.objective)
         values = {**(row_values if has_design else {}), **row.varied}
         inputs, outcomes, outputs = (list_numbers(problem, names, values, row.parameters, _DIGITS) for names in groups)
-        stable, structure = (say_whether(row.stable), row.structure) if has_design else ("", "")
+        stable, structure = (format_bool(row.stable), row.structure) if has_design else ("", "")
         return str(row.number), stable, *inputs, status_text(problem, row.status), *outcomes, structure, *outputs
 
-    inputs, outcomes, outputs = (head_numbers(problem, names) for names in groups)
+    inputs, outcomes, outputs = (list_headings(problem, names) for names in groups)
     return [("row", "stable", *inputs, "status", *outcomes, "structure", *outputs), *map(list_row, rows)]
 
 
@@ -110,9 +112,9 @@ def _write_facts(study: Study, summary: Summary) -> Parts:
         best = show_at(problem, problem.goal or "", summary.best.parameters, summary.best.objective, _DIGITS)
         yield Sentence(f"row {summary.best.number}, {best} at {inputs}", "best", "answer")
     if summary.product is None:
-        for name, ends in summary.spread.items():
+        for name, spread in summary.spread.items():
             if name != "objective" or (study.problem.minimize or "").strip() != "abscissa":
-                lowest, median, highest = (Cell(x, digits=_DIGITS) for x in summary.clocked.get(name, ends))
+                lowest, median, highest = (Cell(x, digits=_DIGITS) for x in summary.clocked.get(name, spread))
                 unit = " 1/s" if name in summary.clocked else ""
                 yield Sentence(f"{lowest} to {highest}{unit}, median {median}{unit}", name)
         yield Sentence(f"{summary.stable} of {sum(summary.counts.values())} rows", "stable")
@@ -123,12 +125,12 @@ def _write_facts(study: Study, summary: Summary) -> Parts:
         label, value = max(summary.laws.items(), key=lambda law: law[1])
         yield f"{len(summary.laws)} laws apply; greatest relative residual {value:.0e} ({label})"
     if summary.product is not None:
-        for name, words in _SHARES.items():
+        for name, share_label in _SHARES.items():
             share: Share = getattr(summary.product, name)
             low, high = share.interval
             interval_text = f"95 % interval {100 * low:.3g} to {100 * high:.3g} %"
             share_text = f"{share.count} of {share.of} ({100 * share.share:.3g} %; {interval_text})"
-            yield Sentence(share_text if share.of else "no row so far", words)
+            yield Sentence(share_text if share.of else "no row so far", share_label)
         values = summary.clocked.get("quantiles", tuple(summary.product.abscissa.values()))
         quantiles = zip(summary.product.abscissa, values, strict=True)
         percentiles = ", ".join(f"{100 * float(q):g} % {Cell(value, digits=_DIGITS)}" for q, value in quantiles)

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from tmsopt.documents.blocks import Cell, Chapter, Listing, Parts, Row, TableBlock, say_whether
+from tmsopt.documents.blocks import Cell, Chapter, Listing, Parts, Row, TableBlock, format_bool
 from tmsopt.guide import describe
 from tmsopt.problem import Posed, unit_at
 from tmsopt.records import Numbers
@@ -32,8 +32,8 @@ def write_question(problem: Posed) -> Parts:
     )
 
 
-def head_numbers(problem: Posed, names: Iterable[str]) -> list[str]:
-    """List headings of columns with their units; the name of a unit does not depend on the design."""
+def list_headings(problem: Posed, names: Iterable[str]) -> list[str]:
+    """List the headings of columns with their units. A design of ones is enough, because it cannot change the units."""
     ones = dict.fromkeys(problem.parameter_set.names, 1.0)
     return [f"{n} {unit_at(problem, n, ones).text}".rstrip() for n in names]
 
@@ -45,8 +45,8 @@ def list_numbers(
     return [Cell(values[n], unit_at(problem, n, design), digits) if n in values else "" for n in names]
 
 
-def without_empty_columns(rows: Sequence[Row]) -> list[Row]:
-    """Leave out the columns of a table that have a heading and nothing below it."""
+def remove_empty_columns(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows of a table without the columns that have a heading and nothing below it."""
     columns = [column for column in zip(*rows, strict=True) if any(map(str, column[1:])) or len(rows) == 1]
     return list(zip(*columns, strict=True))
 
@@ -58,30 +58,30 @@ def tabulate_records(result: Any) -> Parts:
     rows = [tuple(format_value(record.get(n, "")) for n in heads) for record in records[:MAX_ROWS]]
     yield Chapter("rows", width="whole")
     if len(records) > MAX_ROWS:
-        yield f"the first {MAX_ROWS} rows."
+        yield f"the table shows the first {MAX_ROWS} rows."
     yield TableBlock((heads, *rows), type(result).__name__)
 
 
-def thin_rows(rows: Sequence[T], name: str, whole: str, keep: Iterable[int] = ()) -> tuple[list[T], list[str]]:
-    """Choose about `MAX_ROWS` rows, spread evenly, and write a sentence that says so if rows are left out.
+def thin_rows(rows: Sequence[T], noun: str, advice: str, kept_rows: Iterable[int] = ()) -> tuple[list[T], list[str]]:
+    """Choose about `MAX_ROWS` rows, spread evenly. Return them, and a sentence that says so if rows are left out.
 
     Args:
-        name: the plural of what the rows are.
-        whole: how to get all rows, for the sentence.
-        keep: indices of rows that must be chosen.
+        noun: what the rows are, in the plural.
+        advice: how to get all rows, for the sentence.
+        kept_rows: indices of rows that must be chosen.
     """
     if len(rows) <= MAX_ROWS:
         return [*rows], []
-    chosen = {*np.linspace(0, len(rows) - 1, MAX_ROWS).astype(int).tolist(), *keep}
+    chosen = {*np.linspace(0, len(rows) - 1, MAX_ROWS).astype(int).tolist(), *kept_rows}
     thinned = [rows[k] for k in sorted(chosen)]
-    return thinned, [f"{len(thinned)} of {len(rows)} {name}, spread evenly; {whole}."]
+    return thinned, [f"{len(thinned)} of {len(rows)} {noun}, spread evenly; {advice}."]
 
 
 def format_value(value: Any) -> str:
     """Write a value of a record as the cell of a table."""
     match value:
         case None | bool():
-            return say_whether(value)
+            return format_bool(value)
         case float():
             return f"{value + 0.0:.{_DIGITS}g}" if math.isfinite(value) else "none"
     return str(value)

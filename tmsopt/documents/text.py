@@ -11,7 +11,10 @@ from tmsopt.documents.blocks import Block, Document, Figure, Listing, Sentence, 
 WIDTH = 100
 """Characters in a line if there is no terminal, as in a pipe or in `str`."""
 
-_MIN_WRAP_WIDTH, _FIXED_SPACE = 24, "\xa0"  # least width for wrapped words; a space at which no line is broken
+_MIN_WRAP_WIDTH = 24
+"""Minimum width of a column whose words are wrapped."""
+_FIXED_SPACE = "\xa0"
+"""A space at which no line is broken."""
 _STYLES: dict[Tone, str] = {"answer": "bold", "good": "green", "doubt": "yellow", "bad": "red", "dim": "dim"}
 _ASCII = str.maketrans(
     {
@@ -29,7 +32,7 @@ def to_text(document: Document, width: int = WIDTH, colour: bool = False, ascii_
 
     Args:
         colour: whether to add escape codes that a terminal shows as colours.
-        ascii_only: whether to replace letters beyond ASCII, which some encodings lack.
+        ascii_only: whether to replace letters that are not in ASCII, because some encodings do not have them.
     """
     lines = ((line.rstrip(), tone) for line, tone in _lay_out(document, width, ascii_only))
     text = "\n".join(_colour(line, tone) if colour else line for line, tone in lines)
@@ -37,8 +40,8 @@ def to_text(document: Document, width: int = WIDTH, colour: bool = False, ascii_
 
 
 def to_headline(document: Document, width: int = WIDTH) -> str:
-    """Write the kind of result, its words, and its title as far as it fits, in one line."""
-    words = ", ".join(" ".join(word.text.split()) for word in document.words if word.text != "stable")
+    """Write the kind of result, its badges, and its title as far as it fits, in one line."""
+    words = ", ".join(" ".join(badge.text.split()) for badge in document.badges if badge.text != "stable")
     room = width - len(document.kind) - 2
     text = words + (f"; {document.title}" if document.title else "")
     return f"{document.kind}({text if len(text) <= room else text[: room - 1].rstrip() + '…'})"
@@ -48,12 +51,12 @@ def _lay_out(document: Document, width: int, ascii_only: bool) -> Iterator[Line]
     full = document.level != "brief"
     if document.title:
         yield from ((line, "") for line in wrap(_spell(document.title, ascii_only), width))
-    for section in document.sections:
-        blocks = [block for block in section.blocks if not isinstance(block, Figure)]
+    for chapter in document.chapters:
+        blocks = [block for block in chapter.blocks if not isinstance(block, Figure)]
         if not blocks:
             continue
-        if full and len(document.sections) > 1:
-            yield from (("", ""), (section.title, "answer"), ("-" * len(section.title), ""))
+        if full and len(document.chapters) > 1:
+            yield from (("", ""), (chapter.title, "answer"), ("-" * len(chapter.title), ""))
         for block in blocks:
             tone = block.tone if isinstance(block, Sentence | TableBlock) else ""
             yield from ((line, tone) for line in _lay_out_block(block, width, ascii_only, full))
@@ -106,15 +109,15 @@ def _lay_out_list(items: Iterable[tuple[str, str]], width: int, ascii_only: bool
         yield from wrap(text, width, f"  {label}".ljust(indent), " " * indent)
 
 
-def _lay_out_table(grid: TableBlock, width: int, ascii_only: bool, full: bool) -> Iterator[str]:
-    head, *body = grid.texts
-    max_rows = len(body) if full or grid.max_rows is None else grid.max_rows
-    row_numbers = _choose_rows(len(body), max_rows, grid.keep)
+def _lay_out_table(table: TableBlock, width: int, ascii_only: bool, full: bool) -> Iterator[str]:
+    head, *body = table.texts
+    max_rows = len(body) if full or table.max_rows is None else table.max_rows
+    row_numbers = _choose_rows(len(body), max_rows, table.kept_rows)
     cells = zip(head, *(body[k] for k in row_numbers), strict=True)
     columns = [[_spell(cell, ascii_only) for cell in column] for column in cells]
     filled_columns = [k for k, column in enumerate(columns) if any(column)]  # empty columns are left out
     if not any(head):
-        yield from _align(_fold([columns[k][1:] for k in filled_columns], grid.fold, width), width)
+        yield from _align(_fold([columns[k][1:] for k in filled_columns], table.fold, width), width)
     elif full:
         for number, part in enumerate(_split_columns([columns[k] for k in filled_columns], width)):
             yield from [""] * (number > 0)
@@ -122,7 +125,7 @@ def _lay_out_table(grid: TableBlock, width: int, ascii_only: bool, full: bool) -
     else:
         visible_columns = list(filled_columns)
         while len(visible_columns) > 1 and _measure_width([columns[k] for k in visible_columns]) > width:
-            column_number = min(reversed(visible_columns), key=lambda k: grid.priorities[k] if grid.priorities else 0)
+            column_number = min(reversed(visible_columns), key=lambda k: table.priorities[k] if table.priorities else 0)
             visible_columns.remove(column_number)
         yield from _align([columns[k] for k in visible_columns], width)
         hidden_rows = len(body) - len(row_numbers)
@@ -130,19 +133,19 @@ def _lay_out_table(grid: TableBlock, width: int, ascii_only: bool, full: bool) -
         notes = [f"{hidden_rows} more row{'s' * (hidden_rows > 1)}"] if hidden_rows else []
         notes += [f"more columns: {', '.join(hidden_columns)}"] if hidden_columns else []
         if notes:
-            yield from wrap(_spell(f"… {'; '.join(notes)} ({grid.hint})", ascii_only), width, "  ", "    ")
+            yield from wrap(_spell(f"… {'; '.join(notes)} ({table.hint})", ascii_only), width, "  ", "    ")
 
 
-def _choose_rows(count: int, max_rows: int, keep: Collection[int]) -> Sequence[int]:
-    """Choose the first rows; if some rows must be kept, choose the others spread evenly."""
-    if count <= max_rows or not keep:
+def _choose_rows(count: int, max_rows: int, kept_rows: Collection[int]) -> Sequence[int]:
+    """Choose the first rows; if some rows must be kept, choose the other rows spread evenly. Return their indices."""
+    if count <= max_rows or not kept_rows:
         return range(min(count, max_rows))
-    room = max_rows - len(keep)
-    return sorted({*keep, *(round(k * (count - 1) / max(room - 1, 1)) for k in range(room))})[:max_rows]
+    room = max_rows - len(kept_rows)
+    return sorted({*kept_rows, *(round(k * (count - 1) / max(room - 1, 1)) for k in range(room))})[:max_rows]
 
 
 def _measure_width(columns: Columns) -> int:
-    """Measure the width of columns; the last one is narrow if its words can be wrapped."""
+    """Measure the width of columns; the last column is narrow if its words can be wrapped."""
     *first, last = (max(map(len, column)) for column in columns)
     if any(" " in cell for cell in columns[-1]):
         last = min(last, max(_MIN_WRAP_WIDTH, *(len(word) for cell in columns[-1] for word in cell.split())))
@@ -173,7 +176,7 @@ def _fold(columns: Columns, fold: int, width: int) -> Columns:
 
 
 def _align(columns: Columns, width: int) -> Iterator[str]:
-    """Write columns as wide as their widest cells; the last one is wrapped."""
+    """Write columns as wide as their widest cells; the last column is wrapped."""
     widths = [max(map(len, column)) for column in columns[:-1]]
     for *first, last in zip(*columns, strict=True):
         line_start = "  " + "".join(f"{cell:{w}}  " for cell, w in zip(first, widths, strict=True))
@@ -184,13 +187,13 @@ def _align(columns: Columns, width: int) -> Iterator[str]:
 
 
 def _spell(text: str, ascii_only: bool) -> str:
-    """Replace control characters, which a file may contain, and with `ascii_only` all letters beyond ASCII."""
+    """Replace control characters, which a file may contain; if `ascii_only`, also all letters that are not in ASCII."""
     text = "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in text)
     return "".join(map(_name_letter, text.translate(_ASCII))) if ascii_only else text
 
 
 def _name_letter(letter: str) -> str:
-    """Spell a letter beyond ASCII: a Greek letter by its name, others without accents, or as a question mark."""
+    """Spell a letter in ASCII: a Greek letter by its name, another letter without accents, or as a question mark."""
     if letter.isascii():
         return letter
     if (name := unicodedata.name(letter, "")).startswith("GREEK SMALL LETTER "):

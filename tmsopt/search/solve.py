@@ -278,7 +278,7 @@ def _describe_sides(problem: Posed, searched_parts: Sequence[SearchedPart], best
     best_side = next((state.side for state, o in searched_parts if o and o.parameters == best.parameters), None)
     if len(searched_parts) == 1 or best_side is None or best.status != "optimal":
         return ()
-    sentences = [f"both signs of the tilt were searched: {best_side} is better"]
+    sentences = [f"{best_side} is better"]
     for state, outcome in searched_parts:
         if state.side == best_side:
             continue
@@ -291,8 +291,7 @@ def _describe_sides(problem: Posed, searched_parts: Sequence[SearchedPart], best
             return (f"both signs of the tilt were searched: {state.side} is as good as {best_side}",)
         else:
             value = unit_at(problem, problem.goal, outcome.parameters).show(outcome.checked.objective, 6)
-            found = "" if outcome.status == "optimal" else " was found"
-            sentences.append(f"with {state.side} {problem.goal} = {value}{found}")
+            sentences.append(f"the search with {state.side} found {problem.goal} = {value}")
     return ("; ".join(sentences),)
 
 

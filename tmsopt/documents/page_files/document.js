@@ -1,23 +1,23 @@
 "use strict";
 
-const order = new Intl.Collator("en", { numeric: true, sensitivity: "base" });
+const collator = new Intl.Collator("en", { numeric: true, sensitivity: "base" });
 
-/** The number that a cell shows, or NaN. */
+/** Return the number that a cell shows, or NaN. */
 function numberOf(text) {
   return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(text) ? Number(text) : NaN;
 }
 
-/** Cells by size where both are numbers, else as words; empty ones and "none" come last, whatever the direction. */
+/** Compare two cells as numbers if both are numbers, otherwise as words. Empty cells and "none" always come last. */
 function compare(a, b, direction) {
   const missing = (text) => text === "" || text === "none";
   if (missing(a) || missing(b)) {
     return Number(missing(a)) - Number(missing(b));
   }
   const difference = numberOf(a) - numberOf(b);
-  return direction * (Number.isNaN(difference) ? order.compare(a, b) : difference);
+  return direction * (Number.isNaN(difference) ? collator.compare(a, b) : difference);
 }
 
-/** Heads become buttons: ascending, descending, and as the rows were. */
+/** Make each heading a button that sorts the rows: first ascending, then descending, then in the original order. */
 function makeSortable(table) {
   const body = table.tBodies[0];
   const rows = [...body.rows].map((row) => ({ row, cells: [...row.cells].map((cell) => cell.textContent.trim()) }));
@@ -30,16 +30,16 @@ function makeSortable(table) {
     head.replaceChildren(button);
     head.setAttribute("aria-sort", "none");
     button.addEventListener("click", () => {
-      const sense = next[head.getAttribute("aria-sort")];
-      heads.forEach((other) => other.setAttribute("aria-sort", other === head ? sense : "none"));
-      const direction = sense === "descending" ? -1 : 1;
-      const sorted = sense === "none" ? rows : [...rows].sort((a, b) => compare(a.cells[column], b.cells[column], direction));
+      const sorting = next[head.getAttribute("aria-sort")];
+      heads.forEach((other) => other.setAttribute("aria-sort", other === head ? sorting : "none"));
+      const direction = sorting === "descending" ? -1 : 1;
+      const sorted = sorting === "none" ? rows : [...rows].sort((a, b) => compare(a.cells[column], b.cells[column], direction));
       body.append(...sorted.map((entry) => entry.row));
     });
   });
 }
 
-/** A field above a table: rows that have every word stay. */
+/** Put a field above a table; only rows that contain every word in the field are shown. */
 function makeFilterable(table, number) {
   const rows = [...table.tBodies[0].rows].map((row) => ({ row, text: [...row.cells].map((c) => c.textContent).join(" ").toLowerCase() }));
   const field = document.createElement("input");
@@ -53,21 +53,21 @@ function makeFilterable(table, number) {
   count.setAttribute("role", "status");
   count.textContent = `${rows.length} rows`;
   field.addEventListener("input", () => {
-    const asked = field.value.toLowerCase().split(/\s+/).filter(Boolean);
-    let shown = 0;
+    const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+    let shownCount = 0;
     for (const { row, text } of rows) {
-      row.hidden = !asked.every((word) => text.includes(word));
-      shown += row.hidden ? 0 : 1;
+      row.hidden = !words.every((word) => text.includes(word));
+      shownCount += row.hidden ? 0 : 1;
     }
-    count.textContent = asked.length ? `${shown} of ${rows.length} rows` : `${rows.length} rows`;
+    count.textContent = words.length ? `${shownCount} of ${rows.length} rows` : `${rows.length} rows`;
   });
   line.className = "filter";
   line.append(label, field, count);
   table.parentElement.before(line);
 }
 
-/** A line above a table says so while it is wider than the page. */
-function sayWider(frame) {
+/** Put a line above a table that is visible while the table is wider than the page. */
+function addWidthNote(frame) {
   const line = document.createElement("p");
   line.className = "more";
   line.textContent = "More columns to the right: scroll, or use the arrow keys in the table.";
@@ -77,14 +77,14 @@ function sayWider(frame) {
   }).observe(frame);
 }
 
-/** On paper, what is folded is open. */
+/** Open folded parts for printing, and close them afterwards. */
 function openForPrint() {
-  const folded = [...document.querySelectorAll("details:not([open])")];
-  folded.forEach((part) => part.setAttribute("open", ""));
-  window.addEventListener("afterprint", () => folded.forEach((part) => part.removeAttribute("open")), { once: true });
+  const foldedParts = [...document.querySelectorAll("details:not([open])")];
+  foldedParts.forEach((part) => part.setAttribute("open", ""));
+  window.addEventListener("afterprint", () => foldedParts.forEach((part) => part.removeAttribute("open")), { once: true });
 }
 
 document.querySelectorAll("table.sortable").forEach(makeSortable);
 document.querySelectorAll("table.filterable").forEach(makeFilterable);
-document.querySelectorAll(".rows").forEach(sayWider);
+document.querySelectorAll(".rows").forEach(addWidthNote);
 window.addEventListener("beforeprint", openForPrint);
