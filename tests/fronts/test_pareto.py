@@ -445,8 +445,8 @@ def test_the_command_writes_table_csv_and_plot(file, tmp_path):
     objectives, others = "chi_B,sin(2*chi_B) - 0.3*chi_B", "Fr,mu,chi_H,zeta_B,zeta_H,lambda_s (rad)"
     assert lines[0] == f"{objectives},{others},abscissa,structure,stable,limits,label"
     rows = list(csv.DictReader(lines))
-    shown = done.stdout.split("sub-problems")[1].count("\n  ")
-    assert len(rows) == shown - 2  # a heading, a row a point, what is left out
+    shown = done.stdout.split("sub-problems")[1].split("\n\n")[1].splitlines()
+    assert len(rows) == sum(line.startswith("  ") for line in shown) - 2  # a heading, a row a point, what is left out
     x = np.array([float(r["chi_B"]) for r in rows])
     assert np.array([float(r["sin(2*chi_B) - 0.3*chi_B"]) for r in rows]) == pytest.approx(np.sin(2 * x) - 0.3 * x)
     assert (tmp_path / "front.png").read_bytes()[:4] == b"\x89PNG"

@@ -16,7 +16,7 @@ solving = import_module("tmsopt.search.solve")
 scip = pytest.mark.skipif(not SCIP.is_available, reason="SCIP is not installed")
 
 NONE = "no design within the ranges is stable (proved)"
-BOUND = "no design within the ranges is stable and satisfies the constraints (proved)"
+BOUND = "no design within the ranges that satisfies the constraints is stable (proved)"
 UNKNOWN = "no stable design was found, but not proved that none exists"
 
 

@@ -111,7 +111,7 @@ def test_a_study_is_taken_up_where_it_was_left(tmp_path, monkeypatch):
     """Interrupted after three rows; the rest is solved later, and nothing twice."""
     path = tmp_path / "s.sqlite"
     tried = []
-    original = Solver.answers
+    original = Solver.solve_rows
 
     def counting(self, numbers):
         tried.extend(numbers)
@@ -122,7 +122,7 @@ def test_a_study_is_taken_up_where_it_was_left(tmp_path, monkeypatch):
             raise KeyboardInterrupt
 
     monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
-    monkeypatch.setattr(Solver, "answers", counting)
+    monkeypatch.setattr(Solver, "solve_rows", counting)
     with pytest.raises(KeyboardInterrupt):
         run_study(GRID, path, workers=1, progress=interrupt)
     assert stored(path) == {0, 1, 2}

@@ -200,7 +200,7 @@ def test_the_EP_set_is_drawn_solid_below_EP4_and_dashed_above(on_law):
 
 def test_the_least_critical_speed_is_marked_on_the_boundary():
     plane = planes.chi_B_plane(points=(10, 10))
-    Fr, chi_B = plane.marked["least Fr_c"]
+    Fr, chi_B = plane.marked_points["least Fr_c"]
     arcs = plane.chart.domain.stability
     traced = np.concatenate([a.points["Fr"] for a in arcs])
     assert chi_B == pytest.approx(math.sqrt(2), abs=1e-15)
