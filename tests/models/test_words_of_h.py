@@ -21,7 +21,7 @@ def test_parameters_are_real(tmp_path, k):
 
 def test_a_threshold_is_weave_in_data(tmp_path):
     (said,) = faults(tmp_path, f"{HEAD}k = 0.5\n[objective]\nlocate = 'threshold'\n")
-    assert "'threshold' is weave in data; write weave" in said
+    assert "'threshold' is called weave in problem files; write weave" in said
 
 
 def test_a_bare_j_is_told_where_it_is_alone(tmp_path):

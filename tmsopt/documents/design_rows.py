@@ -95,7 +95,8 @@ def list_quantities(solution: Solution, si: Numbers) -> Iterator[Row]:
             cell = Cell(x if abs(x) > FEASIBILITY_TOLERANCE else 0.0, PERCENT, 6)
         text, counterpart = "", q.counterpart
         if counterpart is not None and values is not None:
-            text = _describe_counterpart(counterpart, float(counterpart.value(values)))
+            number = float(counterpart.value(values)) if cell.value else 0.0
+            text = _describe_counterpart(counterpart, number)
         yield q.name, cell, cell.unit.text, text, q.meaning
 
 

@@ -132,7 +132,7 @@ def write_optimality(optimality: Optimality, _level: Level = "full") -> Parts:
     yield Sentence(optimality.reason, "local optimality")
     if optimality.roots:
         of_H = optimality.roots[0].eigenfrequency is not None
-        root = "an eigenfrequency of the largest Im ω" if of_H else "a root on the rightmost line"
+        root = "an eigenfrequency with the largest Im ω" if of_H else "a rightmost root"
         residual_text = f"the optimality conditions hold within {optimality.residual:.1g}"
         yield f"increase of the objective if {root} is forced to move by one unit ({residual_text}):"
         head = ("root", "down" if of_H else "to the left", "share of the total", "if a multiple root splits")
@@ -198,7 +198,7 @@ def _describe_splitting(diagnosis: Diagnosis, full: bool) -> str:
         change = "relative change" if first.relative else "change"
         first_law = f"a {change} ε of {first.parameter} moves it by {_describe_laws(first, diagnosis)}"
         parts = [
-            f"{first_law}, with an error below {100 * DEVIATION:.0f} % {_describe_range(first.laws[0])} (at sampled ε)",
+            f"{first_law}, with an error below {100 * DEVIATION:.0f} % {_describe_range(first.laws[0])} (tested at some ε)",
             *([] if full else other_laws),
         ]
     if unmoved_names:

@@ -66,7 +66,7 @@ def tabulate_boundaries(robustness: Robustness) -> Iterator[TableBlock]:
     heading = "relative changes" if robustness.relative else "changes divided by weights"
     changes: list[Sequence[str]] = [(heading, "distance", *names)]
     weights = (units[name].show(robustness.weights[name], 6) for name in names)
-    values: list[Sequence[str]] = [("values", *names), ("weights, which divide the changes", *weights)]
+    values: list[Sequence[str]] = [("values", *names), ("changes are divided by", *weights)]
     for nearest in boundaries if model.carrier is None else boundaries[:1]:
         distance = "0" if nearest.found else "none found"
         cells = ["" for _ in names]

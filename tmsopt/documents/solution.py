@@ -340,13 +340,11 @@ def _write_search(solution: Solution) -> Parts:
     if starts.tried:
         skipped_count = starts.tried - starts.runs
         skipped_text = (
-            f" ({skipped_count} counted but not run, because they lead to a known optimum)"
-            if starts.runs and skipped_count
-            else ""
+            f" ({skipped_count} not run, because they lead to a known optimum)" if starts.runs and skipped_count else ""
         )
         sample_text = f"; sample of {starts.looked} designs" if starts.looked else ""
         count_text = (
-            f"{starts.tried}{skipped_text}, {starts.converged} converged, {starts.at_best} reached the best design"
+            f"{starts.tried}{skipped_text}; {starts.converged} lead to an optimum, {starts.at_best} to the best design"
         )
         yield Sentence(f"{count_text}{sample_text}; {solution.seconds:.2f} s", "starts")
 

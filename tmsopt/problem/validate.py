@@ -129,8 +129,9 @@ def _ends_faults(parameter_set: ParameterSet, name: str, ends: AnyNumbers, *key:
     faults = [f for end, value in ends.items() for f in _number_faults(parameter_set, name, value, *key, end)]
     lower, upper = ends["min"], ends["max"]
     if not faults and (lower > upper or (lower == upper and key[0] == "scenarios")):
-        order = "greater than" if lower > upper else "not less than"
-        faults = [Fault(f"min = {lower:.6g} is {order} max = {upper:.6g}; swap them", key)]
+        problem = "is greater than max" if lower > upper else "is equal to max"
+        advice = "swap them" if lower > upper else "give two different ends, or fix the parameter"
+        faults = [Fault(f"min = {lower:.6g} {problem} = {upper:.6g}; {advice}", key)]
     return faults
 
 
@@ -262,7 +263,7 @@ def _pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[F
             raise ValueError(f"{short(name)} is no pattern")
         data_name = dict(zip(model.words, ("weave", "capsize"), strict=True)).get(name, name)
         if data_name != name and data_name in patterns_of(model):
-            yield Fault(f"unknown pattern: '{name}' is {data_name} in data; write {data_name}", key)
+            yield Fault(f"unknown pattern: '{name}' is called {data_name} in problem files; write {data_name}", key)
         else:
             pattern_of(model, name)
     except ValueError as error:
