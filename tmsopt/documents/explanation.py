@@ -197,8 +197,9 @@ def _describe_splitting(diagnosis: Diagnosis, full: bool) -> str:
         first = moving_responses[0]
         change = "relative change" if first.relative else "change"
         first_law = f"a {change} ε of {first.parameter} moves it by {_describe_laws(first, diagnosis)}"
+        accuracy = f"with an error below {100 * DEVIATION:.0f} % {_describe_range(first.laws[0])} (tested at some ε)"
         parts = [
-            f"{first_law}, with an error below {100 * DEVIATION:.0f} % {_describe_range(first.laws[0])} (tested at some ε)",
+            f"{first_law}, {accuracy}",
             *([] if full else other_laws),
         ]
     if unmoved_names:
