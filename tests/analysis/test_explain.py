@@ -387,7 +387,7 @@ def test_rounding_in_one_line_says_how_many_digits_are_enough():
     assert share == int(100 * kept[digits])
     assert told.endswith(f"keeps {share} % of the decay rate; {tmsopt.explain(design).worst} needs the most digits")
     assert told.startswith(
-        f"with 3 digits the design keeps {int(100 * kept[3])} % of the decay rate but violates the limit 'offset' and "
+        f"with 3 digits the design loses {round(100 * (1 - kept[3]))} % of the decay rate and violates the limit 'offset' and "
     )  # a workshop's
 
 

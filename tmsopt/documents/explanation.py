@@ -96,10 +96,12 @@ def _describe_effect(row: RoundedDesign, explanation: Explanation) -> str:
         effect = f"shifts its rightmost root by {row.loss:.2g}" if row.loss > _ZERO else "hardly changes"
     elif row.realised >= 0:
         return "is unstable"
-    else:
+    elif _is_near(row, explanation):
         share = min(math.floor(round(100 * row.realised / explanation.abscissa, 6)), 100)
         effect = f"keeps {share} % of the decay rate"
-    return f"{effect} but violates the limit {' and '.join(map(repr, row.violations))}" if row.violations else effect
+    else:
+        effect = f"loses {100 * row.loss / -explanation.abscissa:.2g} % of the decay rate"
+    return f"{effect} and violates the limit {' and '.join(map(repr, row.violations))}" if row.violations else effect
 
 
 def tabulate_rounding(explanation: Explanation) -> TableBlock:
