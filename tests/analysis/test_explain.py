@@ -14,7 +14,7 @@ from mpmath import mp
 
 import tmsopt
 from tmsopt import laws
-from tmsopt.analysis import move_limit, natural_step, round_design, step_within
+from tmsopt.analysis import move_limit, natural_step, proof_line, round_design, step_within
 from tmsopt.cli import command_group as main
 from tmsopt.documents import describe_rounding
 from tmsopt.models import Range, from_coefficients, tms
@@ -402,6 +402,18 @@ def test_digits_that_are_enough_by_chance_are_not_told():
     assert describe_rounding(tmsopt.explain(design, resolve=False)) == (
         f"with 6 digits the design shifts its rightmost root by {moved[6]:.2g}"
     )
+
+
+@pytest.mark.parametrize("value", [-1.0488041, -1.0488049, 8.6400041, 8.6400049])
+@pytest.mark.parametrize("sense", ["minimize", "maximize"])
+def test_a_bound_is_printed_on_its_safe_side(sense, value):
+    """Rounded to six digits, it excludes no design that the proved bound admits."""
+    problem = tmsopt.Problem(from_coefficients([1, "x", 1]), free={"x": (0.1, 1)}, **{sense: "x"})
+    design = tmsopt.solve(problem)
+    text = proof_line(replace(design, bound=replace(design.bound, value=value, gap=1.0, proven=False)))
+    sign, printed = re.search(r"x ([<>]) (\S+) \(method", text).groups()
+    assert abs(float(printed) - value) <= 1e-5
+    assert (sign, float(printed) <= value) == (("<", True) if sense == "minimize" else (">", False))
 
 
 def test_rounding_that_makes_a_design_unstable_is_said_so():

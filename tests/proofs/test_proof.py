@@ -3,6 +3,7 @@
 import json
 import math
 import pickle
+import re
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -159,6 +160,15 @@ def test_the_EP_set_at_an_exact_tangent(tangent, pattern):
     assert proof.stated == ("tan(lambda_s)",)
     sign = float(proof.unknowns["b"]) ** 2 - 4 * float(proof.unknowns["c"])
     assert (sign > 0) is (pattern == "2EP2")
+
+
+def test_the_printed_region_and_error_are_proved():
+    """Rounded to two digits, the region does not grow, and the error does not shrink."""
+    proof = prove("problems/ep4.toml")
+    text = " ".join(proof.report().split())
+    error, region = (float(re.search(rf"{words} (\S+)", text)[1]) for words in ("error at most", "by more than"))
+    assert proof.radius <= error < 1.2 * proof.radius
+    assert 0.9 * proof.uniqueness < region <= proof.uniqueness
 
 
 def test_uniqueness_ends_before_the_other_solution():

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Sequence
 
-from tmsopt.analysis.summary import describe_better, no_design
+from tmsopt.analysis.summary import describe_better, no_design, state_bound
 from tmsopt.models.user_spectrum import describe_user_structure
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.problem.solution import Bound, Solution
-from tmsopt.problem.unit_system import Unit, common_unit
+from tmsopt.problem.unit_system import common_unit
 from tmsopt.problem.verdict.stability import MultipleRoot, describe_crossing
 
 _DIGITS = 12
@@ -58,8 +58,8 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
         return f"{no_design(problem)} {describe_better(solution, text)} (method {bound.method})"
     if math.isfinite(bound.value):
         unit = common_unit(problem, text)
-        value, gap = unit.show(bound.value, 6), unit.show(bound.gap, 2)
-        statement = f"{_state_bound(problem, text, value, bound)}, gap {gap}{_search_effort(bound)}"
+        statement = f"{state_bound(problem, bound, unit)} (method {bound.method}), gap {unit.show(bound.gap, 2)}"
+        statement += _search_effort(bound)
         return _append_advice(statement, not_covered or _advise_certify(bound, "--certify tries to reduce the gap"))
     advice = not_covered or _advise_certify(bound, "--certify looks for a proof or a better design")
     return _append_advice(f"not proved to be the best{_search_effort(bound)}", advice)
@@ -76,18 +76,12 @@ def bound_lines(solution: Solution) -> list[str]:
         return [f"proved: no design satisfies all constraints ({how})"] if bound.proven else []
     if not math.isfinite(bound.value):
         return [f"bound: none found in time ({search})"] if bound.seconds else []
-    text, value = (problem.minimize or problem.maximize or "").strip(), Unit().number(bound.value, _DIGITS)
-    lines = [f"bound: {_state_bound(problem, text, value, bound)}; gap {bound.gap:.1e}"]
+    lines = [f"bound: {state_bound(problem, bound, digits=_DIGITS)} (method {bound.method}); gap {bound.gap:.1e}"]
     if bound.method == bound.solver.lower():
         lines.append(f"how: {search}; {proof_kind}")
     elif bound.seconds:
         lines.append(f"how: {search} found none better in time")
     return lines
-
-
-def _state_bound(problem: Posed, objective: str, value: str, bound: Bound) -> str:
-    sign = ">" if problem.sense == "maximize" else "<"
-    return f"{no_design(problem)} has {objective} {sign} {value} (method {bound.method})"
 
 
 def _append_advice(text: str, advice: str) -> str:

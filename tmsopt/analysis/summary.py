@@ -11,10 +11,11 @@ from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import describe_user_structure
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ROOT_QUANTITIES
-from tmsopt.problem.solution import Solution
-from tmsopt.problem.unit_system import unit_of
+from tmsopt.problem.solution import Bound, Solution
+from tmsopt.problem.unit_system import Unit, round_one_way, unit_of
 
 _ROOT_NAMES = {q.name for q in ROOT_QUANTITIES}
+_NO_UNIT = Unit()
 _RANGE_SHARES = (0.0, 0.29, 0.5, 0.83, 1.0)  # shares of a range at which the effect of a parameter is evaluated
 _ROUNDING = 1e-13  # relative rounding error of a few operations
 _BOUND_DISTANCE = 1e-12  # largest relative distance to a bound for which the bound counts as reached
@@ -52,6 +53,13 @@ def no_design(problem: Posed) -> str:
     return f"no design{f' with {problem.locate}' if problem.locate else ''} within the limits"
 
 
+def state_bound(problem: Posed, bound: Bound, unit: Unit = _NO_UNIT, digits: int = 6) -> str:
+    """State that no design has a better objective than the bound, which is rounded to the safe side."""
+    is_maximum, objective = problem.sense == "maximize", (problem.minimize or problem.maximize or "").strip()
+    value = round_one_way(bound.value / unit.factor, is_maximum, digits) * unit.factor
+    return f"{no_design(problem)} has {objective} {'>' if is_maximum else '<'} {unit.show(value, digits)}"
+
+
 def describe_better(solution: Solution, goal: str) -> str:
     """The predicate of a sentence about a better design: it decays faster, or it has a smaller or larger goal."""
     problem, bound = solution.problem.posed, solution.bound
@@ -74,9 +82,7 @@ def _describe_quality(solution: Solution) -> str:
     origin, doubt = solution.starts.sureness[:1], solution.starts.sureness[1:]
     sureness = ", ".join([*origin, "not proved", *doubt])
     if math.isfinite(bound.value):
-        side = "above" if problem.sense == "maximize" else "below"
-        quantity = "an abscissa" if goal == "abscissa" else f"a value of {goal}"
-        return f"{sureness}; {no_design(problem)} has {quantity} {side} {bound.value:.6g}, gap {bound.gap:.2g}"
+        return f"{sureness}; {state_bound(problem, bound)}, gap {bound.gap:.2g}"
     end = "largest" if problem.sense == "maximize" else "smallest"
     return f"the {end} {goal} found is {unit_of(problem, goal).show(solution.value, 6)}, {sureness}"
 

@@ -28,7 +28,7 @@ from tmsopt.global_search import Completeness
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem import unit_at
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.unit_system import units_of
+from tmsopt.problem.unit_system import round_one_way, units_of
 from tmsopt.problem.verdict.stability import CROSSING
 from tmsopt.proofs.facts import NOT_CHECKED, Verdict
 from tmsopt.proofs.proof import Proof
@@ -138,8 +138,9 @@ def _describe_method(problem: Posed, proof: Proof) -> Parts:
         equations = "a_k = a0 c_k" + (" and the == constraints" if has_constraints else "")
         equations += ", where c_k are the coefficients of the pattern"
         yield Sentence(f"Krawczyk's interval Newton test on the equations {equations}", "method")
-        uniqueness = f"every other such design differs in some number by more than {proof.uniqueness:.2g}"
-        yield f"error at most {proof.radius:.1e} before rounding to these digits; {uniqueness}"
+        error, distance = round_one_way(proof.radius, True, 2), round_one_way(proof.uniqueness, False, 2)
+        uniqueness = f"every other such design differs in some number by more than {distance:.2g}"
+        yield f"error at most {error:.1e} before rounding to these digits; {uniqueness}"
         rounding_text = f"rounding alone can cause a difference of {proof.explained:.1e}"
         yield f"the stored design differs from the proved one by {proof.distance:.1e}; {rounding_text}"
 

@@ -47,7 +47,7 @@ from tmsopt.guide import describe
 from tmsopt.models import tms
 from tmsopt.problem import NO_RADIUS, Case, Problem, amounts_text, common_unit, show_at, status_text, unit_of
 from tmsopt.problem.solution import Solution
-from tmsopt.problem.unit_system import limit_text
+from tmsopt.problem.unit_system import limit_text, round_one_way
 from tmsopt.problem.verdict.stability import ROUNDED, STABLE, UNSTABLE
 from tmsopt.problem.verdict.status import describe_status, describe_verdict
 from tmsopt.records import Numbers
@@ -255,7 +255,8 @@ def _write_cases(solution: Solution, worst: Case) -> Parts:
     if cover is not None:
         method = f"by interval arithmetic on {cover.boxes} boxes" if cover.proven else "by a search, not proved"
         unit = common_unit(problem.posed, "abscissa")
-        yield Sentence(f"abscissa at most {Cell(cover.limit, unit, with_unit=True)}, {method}", "every case")
+        limit = round_one_way(cover.limit / unit.factor, True, ALL_DIGITS) * unit.factor
+        yield Sentence(f"abscissa at most {Cell(limit, unit, with_unit=True)}, {method}", "every case")
 
 
 def _describe_case(problem: Problem, case: Case) -> str:

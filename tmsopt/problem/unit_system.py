@@ -5,6 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Any
 
 from tmsopt.models import Parameter, Quantity
@@ -50,6 +51,11 @@ class Unit:
     def show(self, value: float, digits: int = 5) -> str:
         """A number with this unit as text."""
         return f"{self.number(value, digits)}{f' {self.text}' if self.text and math.isfinite(value) else ''}"
+
+
+def round_one_way(x: float, is_upward: bool, digits: int) -> float:
+    """Round up, or down, to significant digits: a bound that is proved must be true as it is printed."""
+    return float(Context(digits, ROUND_CEILING if is_upward else ROUND_FLOOR).create_decimal_from_float(x))
 
 
 def unit_of(problem: Posed, text: str) -> Unit:

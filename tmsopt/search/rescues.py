@@ -152,7 +152,7 @@ def has_doubtful_claim(state: SearchState) -> bool:
 def move_aside(state: SearchState, policy: Policy) -> SearchState:
     """Replace the best end by a design close to an end, if that design has the objective claimed for this end."""
     problem, tolerance = state.problem, state.tuning.better_by
-    for end in select_distinct_ends(state.ends)[: state.tuning.aside_optima]:
+    for end in select_distinct_ends(state.ends)[: state.tuning.small_step_optima]:
         checked_end = check_end(state, end)
         for design in (checked_end.parameters, *_propose_near_designs(state, checked_end.parameters, end.objective)):
             checked = state.recheck(design)
@@ -173,12 +173,12 @@ def _propose_near_designs(
     assert state.sample is not None
     box, tuning = state.sample.box, state.tuning
     point = box.space.point(design)
-    random = stream(box.seed, "aside").random((tuning.aside_targets, len(point)))
+    random = stream(box.seed, "aside").random((tuning.small_step_targets, len(point)))
     targets = np.concatenate([state.sample.refined.u[: tuning.rival_starts], random])
-    points = point + np.array(tuning.aside_steps)[:, None, None] * (targets - point)
+    points = point + np.array(tuning.small_steps)[:, None, None] * (targets - point)
     batch = box.judge_points(points.reshape(-1, len(point)))
     is_close = (batch.violation == 0) & (
-        np.abs(batch.objective - objective) <= tuning.aside_accuracy * (1 + abs(objective))
+        np.abs(batch.objective - objective) <= tuning.small_step_accuracy * (1 + abs(objective))
     )
     # The rows go from large moves to small ones: a large move may worsen the design, a tiny one is lost in rounding.
     rows = np.flatnonzero(is_close)

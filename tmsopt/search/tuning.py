@@ -146,8 +146,8 @@ class Tuning:
     appeals: int = number(8, "times", "of starting from better sampled designs", "sixfold")
     rival_starts: int = number(2, "designs", "better than the best end, started from each time", "hard")
     better_by: float = number(1e-7, "relative", "difference of the objective that makes a design better", "hard")
-    aside_optima: int = number(3, "optima", "with the best claims, near which designs are tried", "hard")
-    aside_steps: tuple[float, ...] = number(
+    small_step_optima: int = number(3, "optima", "with the best claims, near which designs are tried", "hard")
+    small_steps: tuple[float, ...] = number(
         tuple(10.0 ** -(7 + k / 4) for k in range(33)),
         "of the way to another design",
         "by which an end is moved",
@@ -156,8 +156,8 @@ class Tuning:
     zero_root_size: float = number(
         1e-9, "of the largest root", "size of a root whose sign rounding may decide", "narrow"
     )
-    aside_targets: int = number(30, "designs", "random ones, towards which an end is moved", "hard")
-    aside_accuracy: float = number(
+    small_step_targets: int = number(30, "designs", "random ones, towards which an end is moved", "hard")
+    small_step_accuracy: float = number(
         1e-6, "relative", "accuracy of the objective of such a design, near a double root", "narrow"
     )
     same_design_distance: float = number(1e-3, "of the box", "distance within which an end is the same design", "hard")
