@@ -213,6 +213,12 @@ def test_how_near_a_design_comes_is_said_of_its_worst_case():
     assert 0.167 < float(near) <= float(least)
 
 
+def test_a_load_of_zero_is_zero_in_newtons_too():
+    """The active limit load_rear >= 0 leaves a rounding error of 1e-17."""
+    report = tmsopt.solve("problems/realistic.toml").report(full=True)
+    assert re.search(r"load_rear +0 +% +N_R = 0 N", report)
+
+
 def test_a_proof_that_was_tried_in_vain_is_told_so():
     design = tmsopt.solve("problems/realistic.toml")
     assert "proof: not proved to be the best; --certify" in design.report()

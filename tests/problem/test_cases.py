@@ -96,7 +96,8 @@ z_H = "5 mm"
 
 FAULTS = {
     "scenarios": {
-        "Fr = { min = 2.4, max = 1.2 }": ("Fr", ["min = 2.4", "max = 1.2"]),
+        "Fr = { min = 2.4, max = 1.2 }": ("Fr", ["min = 2.4", "max = 1.2", "swap"]),
+        "Fr = { min = 2, max = 2 }": ("Fr", ["equal to max = 2", "two different ends"]),
         "Fr = { min = 1.2, max = 2.4, points = 1 }": ("Fr.points", ["points = 1", "2 to 99"]),
         "Fr = { min = 1.2, max = 2.4, steps = 3 }": ("Fr.steps", ["'steps'", "min max points"]),
         "Fr = { min = 1.2 }": ("Fr.max", ["missing max", "points = 7"]),
