@@ -215,8 +215,22 @@ def test_how_near_a_design_comes_is_said_of_its_worst_case():
 
 def test_a_load_of_zero_is_zero_in_newtons_too():
     """The active limit load_rear >= 0 leaves a rounding error of 1e-17."""
-    report = tmsopt.solve("problems/realistic.toml").report(full=True)
+    design = tmsopt.solve("problems/realistic.toml")
+    report = design.report(full=True)
     assert re.search(r"load_rear +0 +% +N_R = 0 N", report)
+    counts = re.search(r"starts: (\d+) .*?; (\d+) lead to an optimum, (\d+)", report, re.DOTALL).groups()
+    assert [*map(int, counts)] == [design.starts.tried, design.starts.converged, design.starts.at_best]
+
+
+@pytest.mark.slow
+def test_a_bound_for_every_case_is_printed_on_its_safe_side():
+    """And a column without any cell is left out: the quantities of a problem in SI have no other form."""
+    design = tmsopt.solve("problems/speed_band.toml")
+    printed = re.search(r"every case: abscissa at most (\S+),", design.report())
+    assert design.cover.proven
+    assert design.cover.limit <= float(printed[1]) < design.cover.limit + 1e-11
+    table = tmsopt.solve("problems/delivery_robot.toml").report(full=True).split("Derived quantities")[1]
+    assert "without units" not in table
 
 
 def test_a_proof_that_was_tried_in_vain_is_told_so():
