@@ -44,6 +44,7 @@ def test_the_least_speed_at_which_a_design_is_stable(slow):
     assert shown == pytest.approx(slow.need.value, rel=1e-4)
     assert shown >= slow.need.value
     assert "no stable design" in infeasible_sentences(slow)[0]
+    assert "found for a stable design that satisfies all other limits" in infeasible_sentences(slow)[0]
 
 
 @pytest.mark.slow
@@ -61,6 +62,7 @@ def test_the_least_speed_for_a_decay(speed):
         assert (scanned.min() <= -0.8) == any_
     first, *others = infeasible_sentences(design)
     assert first.startswith("no design with decay (abscissa <= -0.8) was found")
+    assert "found for a design that satisfies all limits" in first
     assert others == []
     assert any("abscissa <= " in line for line in infeasible_sentences(design, full=True)[1:])
 
