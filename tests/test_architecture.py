@@ -18,6 +18,7 @@ FLOORS = (
     ("roots",),
     ("models",),
     ("problem",),
+    ("chains",),
     ("program",),
     ("tracing", "boundaries"),
     ("evaluation", "charts"),

@@ -98,7 +98,7 @@ def test_what_it_saves_is_the_same_system(path, tmp_path):
     assert again.constraints == problem.constraints
     assert dict(again.fixed) == values
     assert again.model.statement == problem.model.statement
-    if problem.model.carrier is None:  # which that of a complex system chooses for its ranges
+    if not problem.model.is_complex:  # which that of a complex system chooses for its ranges
         assert [*map(float, again.posed.values(values).coefficients)] == [
             *map(float, problem.posed.values(values).coefficients)
         ]

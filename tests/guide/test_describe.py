@@ -42,7 +42,7 @@ def test_a_file_is_described_by_every_name_that_it_may_use(path):
     found = tmsopt.describe(path)
     if "study" not in path.stem:
         problem = tmsopt.load(path)
-        hidden = () if problem.model.carrier is None else problem.model.coefficient_names()
+        hidden = () if not problem.model.is_complex else problem.model.coefficient_names()
         assert names(found) == set(problem.posed.vocabulary) - set(hidden)
         assert (found.title, found.model) == (problem.title, problem.model.name)
         assert dict(found.asked.get("constraints", {})) == problem.constraints

@@ -58,7 +58,8 @@ def asked(name, of, tangents=False):
     values = Values(model, own, given).with_known({root: symbol(root) for root in OF_ROOTS})
     listed = [values[n] for n in model.quantity_names(own)]
     matrices = [] if model.pencil is None else model.pencil(own.native(given))
-    every = [*listed, *(x for P in matrices for row in P for x in row)]
+    entries = [x for P in matrices for row in P for x in row]
+    every = [*listed, *(part for x in entries for part in ((x.re, x.im) if hasattr(x, "re") else (x,)))]
     return formula(every, (*own.names, *OF_ROOTS))
 
 

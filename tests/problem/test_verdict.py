@@ -5,8 +5,9 @@ import pytest
 from helpers.texts import faults
 
 import tmsopt
+from tmsopt.chains import located_meetings
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
-from tmsopt.problem.verdict import MultipleRoot, describe_crossing, located_meetings, stability
+from tmsopt.problem.verdict import MultipleRoot, describe_crossing, stability
 from tmsopt.roots import exact_longest, exact_nullity, has_one_eigenvector
 
 

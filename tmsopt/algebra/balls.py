@@ -68,6 +68,11 @@ def number(ball: Any, digits: int) -> Number:
     return Number(_format_decimal(shortened, exponent + dropped_digits), _format_radius(radius, exponent))
 
 
+def complex_ball(x: Any) -> Any:
+    """A ball as a complex ball, a power series as a complex one."""
+    return flint.acb_series(x) if isinstance(x, flint.arb_series | flint.acb_series) else flint.acb(x)
+
+
 def fraction(value: Fraction, digits: int) -> Number:
     """An exact fraction as a decimal, with radius 0 if the decimal terminates."""
     denominator = value.denominator

@@ -136,7 +136,7 @@ def diagnose_roots(
     with high_precision():
         for root in user_roots(model, structure.roots):
             k = root.multiplicity
-            if k == 1 or (root.im < 0 and model.double is None):
+            if k == 1 or (root.im < 0 and not model.is_complex):
                 continue
             stored_point = refine_root(model, parameter_set, design, range_widths, complex(root.re, root.im), k)
             stored_chains = find_chains(stored_point)

@@ -297,7 +297,7 @@ def _list_rightmost_roots(program: LocalProgram, conditions: Conditions) -> tupl
         share = root.multiplicity * c1 / total_multiplier if total_multiplier else math.nan
         beta = c1 / 2 if root.im else c1  # β moves both roots of a pair by β/2
         # the user's root of a complex system is the conjugate
-        (user_root,) = user_roots(model, [root if model.carrier is None else replace(root, im=-root.im)])
+        (user_root,) = user_roots(model, [root if not model.is_complex else replace(root, im=-root.im)])
         omega = (complex(w.re, w.im) for w in eigenfrequencies(model, [user_root]))
         ties = tuple(multipliers.values())
         rightmost_roots.append(

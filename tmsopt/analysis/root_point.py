@@ -1,7 +1,4 @@
-"""A multiple root and the parameters at which it exists, to many digits, and the polynomial around the root.
-
-A model with a complex matrix H = R + iJ has `double`, a real form of H of twice the size. For other models it is None.
-"""
+"""A multiple root and the parameters at which it exists, to many digits, and the polynomial around the root."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -111,17 +108,9 @@ def high_precision() -> Iterator[None]:
 
 
 def evaluate_pencil(model: Model, parameter_set: ParameterSet, values: Mapping[str, Any]) -> tuple[Matrix, ...]:
-    """Matrices, in descending powers, of the matrix polynomial whose roots are diagnosed: s + iH for a complex H."""
-    native = parameter_set.native(values)
-    if model.double is None:
-        assert model.pencil is not None
-        return model.pencil(native)
-    identity, real_form = model.double(native)  # real form: I and −[[J, R], [−R, J]]
-    n = len(real_form) // 2
-    i_times_h = [
-        [_to_complex(row[j]) - flint.acb(0, 1) * _to_complex(row[n + j]) for j in range(n)] for row in real_form[:n]
-    ]
-    return [row[:n] for row in identity[:n]], i_times_h
+    """Matrices, in descending powers, of the matrix polynomial whose roots are diagnosed."""
+    assert model.pencil is not None
+    return model.pencil(parameter_set.native(values))
 
 
 def refine_root(
@@ -134,11 +123,11 @@ def refine_root(
     }
     values = {n: flint.arb(exact(x)) for n, x in design.items()}
     errors = {n: _ROUNDING * x for n, x in sizes.items()}
-    is_real = model.double is None and s.imag == 0
+    is_real = not model.is_complex and s.imag == 0
 
     def polynomial(values: Mapping[str, Any]) -> list[Any]:
         """The polynomial of the system as the user states it."""
-        if model.double is None:
+        if not model.is_complex:
             return model.coefficients(values, parameter_set)
         _, i_times_h = evaluate_pencil(model, parameter_set, values)
         return characteristic_polynomial([[-x for x in row] for row in i_times_h])
@@ -251,10 +240,6 @@ def coefficients_of_order(series: Sequence[Any], m: int) -> list[Any]:
     return [
         c[m] if isinstance(c, flint.arb_series | flint.acb_series) else flint.acb(c if m == 0 else 0) for c in series
     ]
-
-
-def _to_complex(x: Any) -> Any:
-    return flint.acb_series(x) if isinstance(x, flint.arb_series) else flint.acb(flint.arb(x))
 
 
 def midpoint(x: Any) -> complex:

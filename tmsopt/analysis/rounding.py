@@ -79,7 +79,7 @@ def round_design(solution: Solution, choices: Sequence[tuple[Sequence[str], int]
             design = {**solution.parameters, **{n: _parse_exact(text, units[n]) for n, text in written.items()}}
             values, violated = recheck_exactly(problem, design, _list_cases(solution, design))
             abscissa, roots = float(values["abscissa"]), values["structure"].roots
-            has_ratio = sum(r.multiplicity for r in roots) == problem.model.degree and problem.model.carrier is None
+            has_ratio = sum(r.multiplicity for r in roots) == problem.model.degree and not problem.model.is_complex
             row = RoundedDesign(
                 digits=digits,
                 written=Table({n: f"{text} {units[n].text}".rstrip() for n, text in written.items()}),

@@ -36,7 +36,7 @@ def edges_at(problem: Posed, parameters: Numbers) -> tuple[str, ...]:
         structure(c[first_index:], off=errors[first_index:]) if first_index else values["structure"]
     )
     axis_edges = _classify_axis_roots(nearby_structure.roots, errors[first_index:] / abs(c[first_index]))
-    if axis_edges and problem.model.carrier is not None:  # a root 0 is a real eigenfrequency like any other
+    if axis_edges and problem.model.is_complex:  # a root 0 is a real eigenfrequency like any other
         axis_edges = ("weave",)
     return () if axis_edges is None else (*axis_edges, *(["infinity"] if first_index else []))
 

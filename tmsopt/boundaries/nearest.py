@@ -274,7 +274,7 @@ def _find_nearest(
 ) -> Nearest:
     """Find the nearest point of one boundary, over all its edges; for heavy damping, some starts are no crossings."""
     is_damping = kind == "heavy damping"
-    if base.problem.model.carrier is not None and kind != "weave":  # an eigenfrequency can only cross the real line
+    if base.problem.model.is_complex and kind != "weave":  # an eigenfrequency can only cross the real line
         return Nearest(kind)
     if kind in base.edges or (is_damping and base.is_on_damping_edge):
         no_change = dict.fromkeys(base.weights, 0.0)

@@ -158,7 +158,7 @@ class Survey:
             if self.root_formulas.names or {"abscissa", "damping_ratio"} & layers:
                 motion = find_motion(coefficients)
                 fallbacks = motion.fallbacks
-                ratio = motion.damping_ratio if model.carrier is None else np.full(shape, np.nan)
+                ratio = motion.damping_ratio if not model.is_complex else np.full(shape, np.nan)
                 root_quantities = {"abscissa": motion.abscissa, "damping_ratio": ratio}
                 values |= root_quantities | self.root_formulas(columns | root_quantities)
             if {"satisfied", "margin"} & layers:

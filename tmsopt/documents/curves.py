@@ -110,7 +110,7 @@ def _tabulate_points(trace: Trace) -> Parts:
     """Tabulate points of all branches with their events, in the units of the problem."""
     units = {n: unit_of(trace.problem.posed, n) for n in (*trace.problem.free, "abscissa")}
     model = trace.problem.model
-    damping = () if model.carrier is not None else ("heavily damped",)
+    damping = () if model.is_complex else ("heavily damped",)
     facts = ("kind", "stable", *damping, "constraints", "event")
     records = [*trace.records()]
     event_rows = [k for k, record in enumerate(records) if record["event"]]
@@ -148,7 +148,7 @@ def describe_domain(domain: Domain, problem: Posed | None = None) -> Iterator[st
     """Describe the boundaries of stability and of heavy damping."""
     model = problem.model if problem else None
     boundaries = [("stability", domain.stability)]
-    if model is None or model.carrier is None:  # a complex system has no heavy damping
+    if model is None or not model.is_complex:  # a complex system has no heavy damping
         boundaries.append(("heavy damping", domain.heavy_damping))
     for name, arcs in boundaries:
         point_counts: dict[str, list[int]] = {}
@@ -234,7 +234,7 @@ def _tabulate_designs(chart: Chart) -> Parts:
     """Tabulate the designs of the grid; if there are too many, every k-th one along each axis."""
     problem, thinned = chart.problem, _thin_chart(chart, MAX_ROWS)
     hidden_layers = [] if len(problem.constraints) > len(chart.left_aside) else ["satisfied", "margin"]
-    if problem.model.carrier is not None:  # a complex system has neither of these layers
+    if problem.model.is_complex:  # a complex system has neither of these layers
         hidden_layers += ["damping_ratio", "real_roots"]
     grid = reversed(np.meshgrid(*reversed(thinned.grid), indexing="ij"))
     layers = {n: layer for n, layer in thinned.layers.items() if n not in hidden_layers}

@@ -124,7 +124,7 @@ def describe_motion(solution: Solution) -> str:
     decay_text = growth if stability.growth else "neither decay nor growth"
     if not stability.on_edge:
         decay_text = f"{'decay' if abscissa < 0 else 'growth'} time {time_unit.show(1 / abs(abscissa), 4)}"
-    if solution.problem.model.carrier is not None:
+    if solution.problem.model.is_complex:
         edge_text = growth if stability.growth else "neither loss nor gain"
         gain_text = f"{'least loss' if abscissa < 0 else 'gain'} {abs(abscissa):.4g} ({decay_text})"
         real_text = _name_real_eigenfrequencies(solution) if stability.on_edge or solution.beyond_axis else ""
@@ -205,7 +205,7 @@ def describe_inertia(solution: Solution) -> str:
 
 def describe_roots(solution: Solution, digits: int) -> tuple[str, str]:
     """Return a label and a text: the roots, or the eigenfrequencies of a complex system."""
-    if solution.problem.model.carrier is None:
+    if not solution.problem.model.is_complex:
         problem = solution.problem.posed
         unit = unit_at(problem, "abscissa", parameters_of_worst_case(solution))
         unit_text = f"  in {unit.text}" if unit.text else ""
@@ -284,9 +284,7 @@ def _name_real_eigenfrequencies(solution: Solution) -> str:
     """Name the real eigenfrequencies of a complex system."""
     model = solution.problem.model
     real_frequencies = eigenfrequencies(model, roots_on_axis(model, solution.roots))
-    texts = [
-        format_frequency(z.re, 0.0, 5, z.multiplicity, ZERO_SHARE * abs(model.carrier or 0.0)) for z in real_frequencies
-    ]
+    texts = [format_frequency(z.re, 0.0, 5, z.multiplicity, ZERO_SHARE * abs(model.carrier)) for z in real_frequencies]
     return f"; {' and '.join(texts)} {'is' if len(texts) == 1 else 'are'} real" if texts else ""
 
 

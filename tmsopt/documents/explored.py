@@ -31,7 +31,7 @@ def frame_explorer(result: Any, design: Solution | None) -> str:
     from tmsopt.explorer import frame, page_of
 
     problem: Any = getattr(base, "problem", None) or base
-    of_H = problem.model.carrier is not None
+    of_H = problem.model.is_complex
     roots, side = ("eigenfrequencies", "below the real axis") if of_H else ("roots", "left of the imaginary axis")
     return (
         f"<p>Move a parameter, and see the {roots} move: disturbances die out if all of them are {side}.</p>\n"

@@ -104,7 +104,7 @@ def _list_modes(motion: "Simulation", full: bool) -> Iterator[Sequence[str]]:
     is_bicycle = "phi" in motion.columns
     unit = {"s": "1/s", "√(w/g)": "√(g/w)"}.get(motion.units.get("t", ""), "")
     heads = ("steer per lean", "steer ahead of lean") if is_bicycle else ("amplitudes and phases",)
-    yield f"{'eigenfrequency' if motion.problem.model.double else 'root'} {unit}".rstrip(), *heads
+    yield f"{'eigenfrequency' if motion.problem.model.is_complex else 'root'} {unit}".rstrip(), *heads
     for mode in motion.modes:
         size = abs(mode.im) if mode.eigenfrequency is None else _largest_size(motion)
         root = format_root(mode, 6, mode.multiplicity, _ZERO_SHARE * size)
@@ -123,7 +123,7 @@ def _write_notes(motion: "Simulation") -> Iterator[str]:
     merged_modes = {(m.re, m.im): m for m in motion.modes if m.multiplicity > 1}
     yield from map(_describe_merging, merged_modes.values())
     if merged_modes:
-        noun = "eigenfrequencies" if motion.problem.model.double else "roots"
+        noun = "eigenfrequencies" if motion.problem.model.is_complex else "roots"
         yield f"the {noun} belong to the ideal design, the motion belongs to the design with rounded parameters"
     if not motion.stable and (description := _describe_motion_on_axis(motion)):
         yield f"{description}; peaks are within the time shown"
@@ -145,7 +145,7 @@ def _write_notes(motion: "Simulation") -> Iterator[str]:
 
 def _largest_size(motion: "Simulation") -> float:
     """Return the modulus of the largest root; for a complex H, the carrier is first subtracted from the frequencies."""
-    carrier = motion.problem.model.carrier or 0.0
+    carrier = motion.problem.model.carrier
     return max(math.hypot(m.re, m.im - carrier) for m in motion.modes)
 
 
@@ -155,7 +155,7 @@ def _describe_motion_on_axis(motion: "Simulation") -> str:
     axis_modes = [m for m in motion.modes if abs(m.re) <= threshold]
     if any(m.re > threshold for m in motion.modes) or not axis_modes:
         return ""
-    of_H = motion.problem.model.double is not None
+    of_H = motion.problem.model.is_complex
     if power := power_of_t(max(m.partial[0] for m in axis_modes)):
         return f"{UNSTABLE}: modes merge on the {'real' if of_H else 'imaginary'} axis, so the motion grows as {power}"
     root = "an eigenfrequency is real" if of_H else "a root is on the imaginary axis"
@@ -186,7 +186,7 @@ def _choose_unit(motion: "Simulation", name: str) -> Unit:
 
 def write_speeds(speeds: Speeds, level: Level) -> Parts:
     """Write the stable and the heavily damped bands, and every critical speed with its event."""
-    unit, has_roots = unit_of(speeds.problem.posed, speeds.parameter), speeds.problem.model.carrier is None
+    unit, has_roots = unit_of(speeds.problem.posed, speeds.parameter), not speeds.problem.model.is_complex
     stable = f"stable {_format_ranges(speeds.stable, unit)}"
     yield speeds.parameter, stable, count_things(speeds.found, "critical value")
     range_text = f"{speeds.parameter} > {unit.show(speeds.lower, 6)}"
@@ -228,7 +228,7 @@ def _tabulate_crossings(speeds: Speeds, unit: Unit, has_roots: bool) -> Block | 
 
 def write_growth(growth: Growth, _level: Level) -> Parts:
     """Write the parameter and its range, its value at the design, and the stable and the heavily damped bands."""
-    unit, has_roots = unit_of(growth.problem.posed, growth.over.name), growth.problem.model.carrier is None
+    unit, has_roots = unit_of(growth.problem.posed, growth.over.name), not growth.problem.model.is_complex
     yield f"over {growth.over.name}", f"stable {_format_ranges(growth.stable, unit)}", growth.structure
     critical = f", critical value {unit.show(growth.critical, 8)}" if math.isfinite(growth.critical) else ""
     range_text = f"over {growth.over.name} from {unit.number(growth.values[0], 6)} to {unit.show(growth.values[-1], 6)}"

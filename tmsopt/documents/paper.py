@@ -48,7 +48,7 @@ def write_comparison(comparison: Comparison, _level: Level) -> Parts:
     else:
         yield Chapter("laws")
         model_name = f"the {model.title}" if model.statement is None else f"'{model.title}'"
-        of_skates = "" if model.carrier is not None else ", only for skates (tms)"
+        of_skates = "" if model.is_complex else ", only for skates (tms)"
         yield f"no laws are known for {model_name}{of_skates}"
     yield Chapter("formulations")
     if comparison.other is None:

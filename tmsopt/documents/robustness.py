@@ -41,7 +41,7 @@ def describe_robustness(robustness: Robustness, on_edge: bool = False) -> str:
         on_edge: whether the ideal design is on the edge of stability; its rounded numbers may lie next to the edge.
     """
     if robustness.edges:
-        edge = _EDGE if robustness.problem.model.carrier is None else _EDGE_OF_H
+        edge = _EDGE if not robustness.problem.model.is_complex else _EDGE_OF_H
         edge_names = " and ".join(edge[kind] for kind in robustness.edges)
         if robustness.zeros:
             zeros = ", ".join(f"{n} = 0" for n in robustness.zeros)
@@ -67,7 +67,7 @@ def tabulate_boundaries(robustness: Robustness) -> Iterator[TableBlock]:
     changes: list[Sequence[str]] = [(heading, "distance", *names)]
     weights = (units[name].show(robustness.weights[name], 6) for name in names)
     values: list[Sequence[str]] = [("values", *names), ("changes are divided by", *weights)]
-    for nearest in boundaries if model.carrier is None else boundaries[:1]:
+    for nearest in boundaries if not model.is_complex else boundaries[:1]:
         distance = "0" if nearest.found else "none found"
         cells = ["" for _ in names]
         if nearest.found and nearest.distance > 0:

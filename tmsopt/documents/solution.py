@@ -245,7 +245,7 @@ def _write_cases(solution: Solution, worst: Case) -> Parts:
     problem, cover, least_damped, fastest = solution.problem, solution.cover, solution.least_damped, solution.fastest
     case_text = "objective, motion and roots belong to this case, all other lines to the nominal design"
     yield Sentence(f"{_describe_case(problem, worst)}; {case_text}", "worst case")
-    if least_damped not in (None, worst) and problem.model.carrier is None:
+    if least_damped not in (None, worst) and not problem.model.is_complex:
         label = "least damped case found" if problem.tolerances else "least damped case"
         yield Sentence(f"{_describe_case(problem, least_damped)}; the damping ratio belongs to this case", label)
     if fastest not in (None, worst):

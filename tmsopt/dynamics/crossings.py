@@ -120,7 +120,7 @@ def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, b
 
 def user_crossings(model: Model, crossings: Crossings) -> Crossings:
     """The crossings as the user sees them. For a complex system, they are crossings of its eigenfrequencies."""
-    if model.carrier is None:
+    if not model.is_complex:
         return crossings
     user_found = tuple(
         replace(c, kind=user_structure_name(model, c.kind), root=user_roots(model, [replace(c.root, im=-c.root.im)])[0])

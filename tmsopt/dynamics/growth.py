@@ -188,7 +188,7 @@ def growth(
         is_bicycle=is_bicycle(model) and model.degree == _BICYCLE_DEGREE,
         over_speed=is_speed,
     )
-    if model.carrier is not None:
+    if model.is_complex:
         root_values = user_root_array(model, root_values)
         modes = tuple(
             replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * model.carrier) for m in modes

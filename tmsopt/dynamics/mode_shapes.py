@@ -72,10 +72,7 @@ def compute_mode_shapes(
     pencil = matrices_of(model)(parameter_set.native(parameters))
     names = coordinates_of(model, pencil)
     diagnoses = diagnose_roots(model, parameter_set, parameters, structure)
-    if model.double is not None:  # a complex H = R + iJ has the real matrix −[[J, R], [−R, J]]
-        n = len(names)
-        pencil = [np.eye(n), pencil[1][:n, :n] - 1j * pencil[1][:n, n:]]
-    roots = [r for r in user_roots(model, structure.roots) if model.double or r.im >= 0]
+    roots = [r for r in user_roots(model, structure.roots) if model.is_complex or r.im >= 0]
     shapes = []
     partial: tuple[int, ...]
     for root in sorted(roots, key=lambda r: (-r.re, -r.im)):

@@ -227,7 +227,7 @@ def simulate(
 def _is_stable(problem: Posed, structure: Structure) -> bool:
     """Whether the design is stable. Multiple roots, and roots of a complex H, must be stable by more than rounding."""
     rightmost_multiplicities = [r.multiplicity for r in structure.roots if r.re == structure.abscissa]
-    is_complex = problem.model.carrier is not None  # only a complex H has a carrier, a shift of its eigenfrequencies
+    is_complex = problem.model.is_complex  # only a complex H has a carrier, a shift of its eigenfrequencies
     is_exact = not is_complex and max(rightmost_multiplicities, default=1) == 1
     max_root_size = max((r.size for r in structure.roots), default=0.0)
     return structure.abscissa < (0.0 if is_exact else -_ROUNDING * max_root_size)

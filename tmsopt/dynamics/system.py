@@ -61,35 +61,34 @@ def is_bicycle(model: Model) -> bool:
 
 
 def matrices_of(model: Model) -> Any:
-    """The matrices of a model as a function of its native parameters; for a complex H, the matrices of (Re ψ, Im ψ).
+    """The matrices of a model as a function of its native parameters.
 
     Raises:
         InputError: if only the characteristic polynomial is known.
     """
-    pencil = model.double or model.pencil
+    pencil = model.pencil
     if pencil is None:
         advice = "give its matrices under [model], M, D and K or A (in Python tmsopt.models.from_matrices)"
         message = f"'{model.name}' has coefficients only, which determine roots but no motion; {advice}"
         raise input_error(message, "model")
-    return lambda native: [np.array(P, dtype=float) for P in pencil(native)]
+    kind = complex if model.is_complex else float
+    return lambda native: [np.array(P, dtype=kind) for P in pencil(native)]
 
 
 def coordinates_of(model: Model, pencil: Sequence[Any]) -> tuple[str, ...]:
     """Names of the coordinates of a mode: lean and steer, ``q1 …``, ``x1 …``, or ``psi1 …`` for a complex H."""
     if is_bicycle(model):
         return ANGLES
-    n, letter = len(pencil[0]), "q" if len(pencil) == 3 else "x"
-    if model.double is not None:
-        n, letter = n // 2, "psi"
-    return tuple(f"{letter}{k}" for k in range(1, n + 1))
+    letter = "psi" if model.is_complex else "q" if len(pencil) == 3 else "x"
+    return tuple(f"{letter}{k}" for k in range(1, len(pencil[0]) + 1))
 
 
 def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
     """The linear system of a design, in SI if the problem is in SI, otherwise in the model's own units.
 
     M q″ + D q′ + K q = 0 becomes x′ = A x with x = (q, q′). Two matrices I, −A give A directly. A bicycle has the yaw
-    and the rear contact of `contact_path` as further states, so these are also exact. For ψ′ = −i H ψ with H = R + i J,
-    the matrix [[J, R], [−R, J]] is reordered to the states Re ψ₁, Im ψ₁, Re ψ₂ ….
+    and the rear contact of `contact_path` as further states, so these are also exact. For ψ′ = −i H ψ the
+    states are Re ψ₁, Im ψ₁, Re ψ₂ ….
 
     Raises:
         InputError: without matrices, or if the mass matrix is singular.
@@ -109,9 +108,8 @@ def system_of(problem: Posed, parameters: Mapping[str, float]) -> System:
         return _build_bicycle_system(A, pencil[0], problem, parameters)
     q = coordinates_of(model, pencil)
     names = (*q, *(f"{name}dot" for name in q)) if len(pencil) == 3 else q
-    if model.double is not None:
-        order = np.arange(n).reshape(2, -1).T.ravel()
-        A = A[np.ix_(order, order)]
+    if model.is_complex:
+        A = np.kron(A.real, np.eye(2)) + np.kron(A.imag, [[0.0, -1.0], [1.0, 0.0]])
         q = names = tuple(f"{name}_{part}" for name in q for part in ("re", "im"))
     return System(names, q, A, Table(dict(zip(names, np.eye(len(names)), strict=True))), Table(), math.nan, Table())
 

@@ -68,7 +68,7 @@ def can_evaluate_columns(problem: Posed) -> bool:
     The problem may not have free parameters, cases, a pattern or a complex model. It may not use the robustness radius
     or the angular frequency.
     """
-    excluded = problem.free or problem.scenarios or problem.tolerances or problem.model.carrier is not None
+    excluded = problem.free or problem.scenarios or problem.tolerances or problem.model.is_complex
     return not (excluded or problem.pattern or problem.asks(RADIUS) or problem.asks(ANGULAR_FREQUENCY))
 
 

@@ -146,7 +146,7 @@ class _Design:
         )
         if stored:
             yield ("abscissa_realised", ""), _find_rightmost(stored), 0
-        if least_damped_roots and model.carrier is None:
+        if least_damped_roots and not model.is_complex:
             known_values["damping_ratio"] = reduce(ball_minimum, map(_compute_damping_ratio, least_damped_roots))
         if fastest_roots and ANGULAR_FREQUENCY in checked.quantities:
             known_values[ANGULAR_FREQUENCY] = reduce(ball_maximum, (root.im for root in fastest_roots))
@@ -222,7 +222,7 @@ def _compute_damping_ratio(root: EnclosedRoot) -> Any:
 def _to_user_roots(model: Model, roots: _Roots) -> _Roots:
     """The roots as users see them, with the carrier of a complex H; an imaginary part of at most 2⁻²¹² counts as 0."""
     converted: _Roots = user_roots(model, roots)
-    if model.carrier is None:
+    if not model.is_complex:
         return converted
     tolerance = flint.arb(2) ** -_PRECISIONS[0] * (1 + abs(model.carrier))
     return tuple(replace(z, im=flint.arb(0)) if z.im.contains(0) and abs(z.im) < tolerance else z for z in converted)

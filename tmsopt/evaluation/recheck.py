@@ -12,6 +12,7 @@ from tmsopt.algebra.formula import Formula, UnsupportedOperation, formula, symbo
 from tmsopt.algebra.intervals import ranges
 from tmsopt.algebra.kinds import gradients
 from tmsopt.boundaries.nearest import Robustness, find_stability_margins
+from tmsopt.chains.meetings import is_crossing
 from tmsopt.models import Model, Values
 from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import public_names
@@ -19,7 +20,6 @@ from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import WORSE_DIRECTION, depends_on_case
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, roots_at
-from tmsopt.problem.verdict.meetings import is_crossing
 from tmsopt.records import Numbers, Table
 from tmsopt.roots import Structure, pattern_distance
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tmsopt.analysis import proof_line
+from tmsopt.chains.meetings import meetings
 from tmsopt.errors import InputError
 from tmsopt.guide import example
 from tmsopt.models.user_spectrum import user_structure
 from tmsopt.problem import Posed, Solution, degrees_of_freedom
 from tmsopt.problem.files import problem_from_tables
-from tmsopt.problem.verdict.meetings import meetings
 from tmsopt.problem.verdict.stability import MultipleRoot
 from tmsopt.problem.verdict.status import describe_status, describe_verdict
 from tmsopt.roots import Structure

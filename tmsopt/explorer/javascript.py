@@ -142,7 +142,7 @@ def _make_pencil(problem: Posed) -> tuple[Formula | None, int, int]:
     """Entries of the matrices of a model, number of rows of a matrix, and order (number of matrices minus one)."""
     model, parameter_set = problem.model, problem.parameter_set
     # With a carrier (added to the frequencies of a complex H), the motion is not the motion of the user's system.
-    if model.pencil is None or model.carrier is not None:
+    if model.pencil is None or model.is_complex:
         return None, 0, 0
     matrices = model.pencil(parameter_set.native({n: symbol(n) for n in parameter_set.names}))
     return formula(e for matrix in matrices for row in matrix for e in row), len(matrices[0]), len(matrices) - 1

@@ -58,7 +58,7 @@ def make_page_data(
         "impulseUnit": _IMPULSE_UNIT if parameter_set.torque is None else "N·m·s",
         "words": dict(words_of(problem.model)),
         "rootUnit": unit_of(problem, "abscissa").text,
-        "carrier": problem.model.carrier,
+        "carrier": problem.model.carrier if problem.model.is_complex else None,
         "onAxis": AXIS_TOLERANCE,
         "smallest": MIN_SIZE,
         "parameters": [_describe_parameter(problem, p, start[p.name]) for p in parameter_set.parameters],

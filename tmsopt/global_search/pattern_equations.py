@@ -141,7 +141,7 @@ def find_rotating_frame(problem: Posed) -> RotatingFrame | None:
     Raises:
         UnsupportedOperation: for an operation without interval arithmetic.
     """
-    if problem.model.double is None:
+    if not problem.model.is_complex:
         return None
     names = tuple(problem.free)
     rows = _complex_matrix(problem, {**problem.as_nodes(problem.fixed), **{n: symbol(n) for n in names}})
@@ -159,10 +159,9 @@ def find_rotating_frame(problem: Posed) -> RotatingFrame | None:
 
 def _complex_matrix(problem: Posed, parameters: Mapping[str, Any]) -> list[list[Pair]]:
     """The matrix −i H of a model with a complex H."""
-    assert problem.model.double is not None
-    _, rows = problem.model.double(problem.parameter_set.native(parameters))  # [[−J, −R], [R, −J]] of H = R + i J
-    n = len(rows) // 2
-    return [[Pair(-row[j], row[n + j]) for j in range(n)] for row in rows[:n]]
+    assert problem.model.pencil is not None
+    _, rows = problem.model.pencil(problem.parameter_set.native(parameters))
+    return [[-x for x in row] for row in rows]
 
 
 def _complex_coefficients(problem: Posed, parameters: Mapping[str, Any], frame: RotatingFrame) -> list[Any]:

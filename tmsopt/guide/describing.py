@@ -73,7 +73,7 @@ def _describe(model: Model, problem: Posed | None = None, tables: TypedTables = 
     return Description(
         model=model.name,
         meaning=model.title,
-        degree=model.degree if model.carrier is None else model.degree // 2,
+        degree=model.degree if not model.is_complex else model.degree // 2,
         title=problem.title if problem else "",
         sets=tuple(
             _list_words(model, parameter_set, problem, model_table)

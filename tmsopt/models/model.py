@@ -240,7 +240,7 @@ class Model:
         compact: like `polynomial`, but the coefficients are divided by a positive number and computed in few
             operations with common terms, which gives tighter bounds in interval arithmetic.
         pencil: native parameters → matrices of the matrix polynomial with these roots, in descending powers: M, D, K
-            of M s² + D s + K, or I, −A.
+            of M s² + D s + K, or I, −A; for a complex H the complex matrices I, i H.
         feedback: native parameters → the torques of a controller, which the pencil already includes.
         natural: whether coefficients and roots are near 1 in native units.
         origin: a function and its arguments, plain data, that make this model in another process.
@@ -252,11 +252,9 @@ class Model:
         conventions: texts about the signs.
         sketch: drawing as text.
         absent: unknown names that a user may try → what to write instead.
-        carrier: number added to each eigenfrequency of a complex H; None for a real system. The real polynomial of H
+        carrier: number added to each eigenfrequency of a complex H; 0 for a real system. The real polynomial of H
             has twice the degree. Because of the carrier, none of its roots coincides with the conjugate of another.
         carried: for a complex H, ranges of the native parameters → the model with a carrier for these ranges.
-        double: for a complex H, the pencil of the real system of twice the size without carrier: I and −A of
-            (Re ψ, Im ψ)′ = A (Re ψ, Im ψ).
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -285,9 +283,8 @@ class Model:
     conventions: tuple[str, ...] = ()
     sketch: str = ""
     absent: Mapping[str, str] = Table()
-    carrier: float | None = None
+    carrier: float = 0.0
     carried: Callable[[Mapping[str, tuple[float, float]]], "Model"] | None = None
-    double: Callable[[AnyNumbers], Matrices] | None = None
 
     def __repr__(self) -> str:
         return f"Model(name={self.name!r}, title={self.title!r}, degree={self.degree}, natural={self.natural})"
@@ -322,6 +319,11 @@ class Model:
             outputs = [*(native[n] for n in self.sets[0].names), *coefficients]
             formulas[parameter_set.name] = formula(outputs, parameter_set.names)
         return formulas
+
+    @property
+    def is_complex(self) -> bool:
+        """Whether the system is stated by a complex H."""
+        return self.carried is not None
 
     def within(self, ranges: Mapping[str, tuple[float, float]]) -> "Model":
         """The model for parameters in given ranges: a complex H gets a carrier for them, other models stay the same."""

@@ -34,17 +34,17 @@ def pattern_of(model: Model, name: str) -> Pattern:
     Raises:
         ValueError: if the name is unknown, or the pattern needs more roots than the model has.
     """
-    return pattern(name, model.degree) if model.carrier is None else complex_pattern(name, model.degree // 2)
+    return pattern(name, model.degree) if not model.is_complex else complex_pattern(name, model.degree // 2)
 
 
 def patterns_of(model: Model) -> tuple[str, ...]:
     """Names of the patterns of a model that are not composed of other patterns."""
-    return pattern_names(model.degree) if model.carrier is None else complex_pattern_names(model.degree // 2)
+    return pattern_names(model.degree) if not model.is_complex else complex_pattern_names(model.degree // 2)
 
 
 def full_patterns(model: Model) -> tuple[str, ...]:
     """Names of the patterns in which all roots coincide in one root or one pair; empty for one root."""
-    if model.carrier is not None:
+    if model.is_complex:
         return (f"EP{model.degree // 2}",) if model.degree > 2 else ()
     pairs = (f"CEP{model.degree // 2}",) if model.degree > 2 and model.degree % 2 == 0 else ()
     return (f"EP{model.degree}", *pairs) if model.degree > 1 else ()
@@ -52,25 +52,25 @@ def full_patterns(model: Model) -> tuple[str, ...]:
 
 def public_names(model: Model, parameter_set: ParameterSet) -> tuple[str, ...]:
     """`Model.quantity_names`, without the coefficients of a complex H, which depend on the carrier."""
-    hidden = () if model.carrier is None else model.coefficient_names()
+    hidden = () if not model.is_complex else model.coefficient_names()
     return tuple(n for n in model.quantity_names(parameter_set) if n not in hidden)
 
 
 def user_structure_name(model: Model, name: str) -> str:
     """The user's name of a pattern or structure of the polynomial."""
-    return name if model.carrier is None else complex_name(name)
+    return name if not model.is_complex else complex_name(name)
 
 
 def user_roots(model: Model, roots: Iterable[Any]) -> tuple[Any, ...]:
     """The user's roots for roots of the polynomial: numbers or balls with ``re``, ``im`` and multiplicity."""
-    if model.carrier is None:
+    if not model.is_complex:
         return tuple(roots)
     return tuple(replace(r, im=r.im + model.carrier) for r in roots if r.im < 0)
 
 
 def user_root_array(model: Model, roots: Any) -> Any:
     """The user's roots for a complex array with all roots along its last axis, in the order of their real parts."""
-    if model.carrier is None:
+    if not model.is_complex:
         return roots
     import numpy as np
 
@@ -85,7 +85,7 @@ def user_structure(model: Model, structure: Structure) -> Structure:
 
 def polynomial_structure(model: Model, name: str, roots: Sequence[Root]) -> Structure:
     """The structure of the polynomial for a user's name and roots; the inverse of `user_structure`."""
-    if model.carrier is None:
+    if not model.is_complex:
         return Structure(name, tuple(roots), 0.0)
     lower = [replace(r, im=r.im - model.carrier) for r in roots]
     return Structure(real_form_name(name), tuple(w for r in lower for w in (replace(r, im=-r.im), r)), 0.0)
@@ -93,21 +93,21 @@ def polynomial_structure(model: Model, name: str, roots: Sequence[Root]) -> Stru
 
 def describe_user_structure(model: Model, structure: str, has_gain: bool = False) -> str:
     """A user's structure in words, which for a complex H depend on whether it has gain."""
-    if model.carrier is None:
+    if not model.is_complex:
         return describe_structure(structure, model.degree)
     return describe_complex_structure(structure, model.degree // 2, has_gain)
 
 
 def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """ω = i s for the user's roots; empty for a real system."""
-    rounded_roots = () if model.carrier is None else remove_rounding(model, roots)
+    rounded_roots = () if not model.is_complex else remove_rounding(model, roots)
     return tuple(Root(-r.im + 0.0, r.re, r.multiplicity) for r in rounded_roots)
 
 
 def remove_rounding(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:
     """The user's roots, in which real and imaginary parts as small as the rounding error of the carrier are 0."""
     all_roots = tuple(roots)
-    rounding = 0.0 if model.carrier is None else _ROUNDING * _max_modulus(model, all_roots)
+    rounding = 0.0 if not model.is_complex else _ROUNDING * _max_modulus(model, all_roots)
     parts = ([x if abs(x) > rounding else 0.0 for x in (r.re, r.im)] for r in all_roots)
     return tuple(Root(re, im, r.multiplicity) for (re, im), r in zip(parts, all_roots, strict=True))
 
@@ -131,4 +131,4 @@ def distance_beyond_axis(model: Model, located: Sequence[str], roots: Sequence[R
 
 def _max_modulus(model: Model, roots: Iterable[Root]) -> float:
     """Largest |s| of the roots of the polynomial; for a complex H it includes the carrier."""
-    return max((math.hypot(r.re, r.im - (model.carrier or 0.0)) for r in roots), default=0.0)
+    return max((math.hypot(r.re, r.im - model.carrier) for r in roots), default=0.0)

@@ -77,7 +77,7 @@ def _fill(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str, **look: Any) -> 
 
 def class_handles(kind: NDArray[np.int8], model: Model) -> list[Patch]:
     """Legend entries of the classes that occur."""
-    prefix = "unstable by" if model.carrier is None else "gain, beyond"
+    prefix = "unstable by" if not model.is_complex else "gain, beyond"
     labels = {event: f"{prefix} {name}" for event, name in events_of(model).items()}
     return [
         Patch(facecolor=CLASS_COLOURS[code], edgecolor="grey", label=labels.get(CLASSES[code], CLASSES[code]))
@@ -245,7 +245,7 @@ def _draw_optimum(ax: Axes, chart: Chart, plane: PlaneAxes) -> list[Line2D]:
     It is the optimum of the problem if there is one, otherwise the best grid point; the legend says which.
     """
     problem = chart.problem.posed.nominal
-    is_complex = problem.model.carrier is not None
+    is_complex = problem.model.is_complex
     if problem.objective is not None or problem.pattern is not None:
         solution = solve(problem, throw=False, interruptible=False)
         if solution.status == "optimal":

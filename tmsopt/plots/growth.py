@@ -208,7 +208,7 @@ def _compute_heights(data: Growth, values: Any, roots: Any, part: str) -> Array:
 
 
 def _is_complex_H(data: Growth) -> bool:
-    return data.problem.model.carrier is not None
+    return data.problem.model.is_complex
 
 
 def _draw_marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:

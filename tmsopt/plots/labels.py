@@ -105,7 +105,7 @@ def scale_over(problem: Posed, parameter: Parameter) -> AxisScale:
 def abscissa_label(problem: Posed, words: str = "spectral abscissa") -> str:
     """Label of the abscissa with its unit: 1/s for a model in SI, √(g/w) for a dimensionless model with data in SI."""
     parameters = problem.parameter_set
-    if problem.model.carrier is not None:
+    if problem.model.is_complex:
         return rf"largest {COMPLEX_H_LABELS['real']}"
     if parameters.rate is None:
         return words

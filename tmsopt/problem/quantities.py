@@ -91,7 +91,7 @@ def roots_at(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) 
 
 
 def _damping_ratio(values: AnyNumbers) -> float:
-    if isinstance(values, Values) and values.model.carrier is not None:
+    if isinstance(values, Values) and values.model.is_complex:
         return math.nan  # the frequencies of a complex system have no fixed zero
     roots = values["structure"].roots
     ratios = (-r.re / r.size if r.re or r.im else 0.0 for r in roots)

@@ -9,6 +9,7 @@ from tmsopt.algebra.balls import rational
 from tmsopt.algebra.kinds import BALLS
 from tmsopt.models import Values
 from tmsopt.models.exact import ExactDesign
+from tmsopt.models.user_spectrum import user_roots
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.proofs.existence import EXACT, ProvedDesign
@@ -68,7 +69,8 @@ def eigenvector_verdict(problem: Posed, design: ExactDesign, proved_design: Prov
             is_defective, f"{largest_nullity} eigenvector{'s' * (largest_nullity > 1)}, in fractions"
         )
     matrices_at = pencil(parameter_set.native(proved_design.parameters))
-    roots = [flint.acb(z.re, z.im) for f in repeated_factors for z in factor_roots(f) or ()]
+    all_roots = user_roots(problem.model, (z for f in repeated_factors for z in factor_roots(f) or ()))
+    roots = [flint.acb(z.re, z.im) for z in all_roots]
     has_one = bool(roots) and all(has_one_eigenvector(matrices_at, s) for s in roots)
     words = (
         "one eigenvector, because a minor of the matrix is not 0 (interval arithmetic)"

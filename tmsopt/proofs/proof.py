@@ -270,7 +270,7 @@ def _candidate_patterns(problem: Posed, structure: str, roots: Sequence[Root]) -
     if target and not (has_pattern(roots, target.form) if roots else target.form == structure):
         patterns = []
     user_patterns = [quartic.get(p.name, p) for p in patterns]
-    if problem.model.carrier is not None:
+    if problem.model.is_complex:
         user_patterns = [as_complex_pattern(p) for p in user_patterns]
     return list({p.name: p for p in [*user_patterns, *([target] if target else [])]}.values())
 
@@ -314,7 +314,7 @@ def _assemble(
         for n, ball in proved_design.parameters.items()
     }
     abscissa = proved_design.factorisation.abscissa
-    is_real = problem.model.carrier is None
+    is_real = not problem.model.is_complex
     # For a complex H, these are unknowns of a real matrix that the user did not state.
     hidden_unknowns = () if is_real or pattern is None else pattern.unknowns
     hidden_unknowns = (*hidden_unknowns, *(f"{pattern.name}.{n}" for n in hidden_unknowns)) if pattern else ()

@@ -6,7 +6,7 @@ from itertools import islice
 
 import numpy as np
 
-from tmsopt.problem.verdict.meetings import is_crossing
+from tmsopt.chains.meetings import is_crossing
 from tmsopt.program import NLP, initial_point
 from tmsopt.program.ipopt import make_ipopt
 from tmsopt.records import Array

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Unpack
 
 from tmsopt.boundaries import find_edges, is_exactly_multiple
+from tmsopt.chains.meetings import all_meetings
 from tmsopt.errors import Fault, InputError, is_number, short, suggest
 from tmsopt.evaluation import missed_note, prove_worst_case
 from tmsopt.evaluation.bound import minimizes_abscissa
@@ -28,7 +29,6 @@ from tmsopt.problem import (
 )
 from tmsopt.problem.dependence import sense_notes
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
-from tmsopt.problem.verdict.meetings import all_meetings
 from tmsopt.problem.verdict.stability import stability
 from tmsopt.program import DEFAULTS, Options, SolveOptions, make_options, objective_size
 from tmsopt.program.options import documents_options
@@ -377,7 +377,7 @@ def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str
     unstable_note = (UNSTABLE,) if violated_limits and checked.structure.abscissa >= 0 else ()
     real_part = distance_beyond_axis(problem.model, problem.located, checked.structure.roots) if is_optimal else None
     if real_part:
-        words = "root has real part" if problem.model.carrier is None else "eigenfrequency has gain"
+        words = "root has real part" if not problem.model.is_complex else "eigenfrequency has gain"
         return (f"not the edge of stability: another {words} {unit_of(problem, 'abscissa').show(real_part, 2)}",)
     if unstable_note or not is_optimal or checked.structure.abscissa < 0:
         return unstable_note

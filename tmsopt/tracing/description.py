@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tmsopt.problem.verdict.meetings import is_crossing
+from tmsopt.chains.meetings import is_crossing
 from tmsopt.problem.verdict.stability import CROSSING
 from tmsopt.records import Array
 from tmsopt.roots import Pattern, pattern as pattern_of

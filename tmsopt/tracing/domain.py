@@ -103,7 +103,7 @@ def domain(
     More: docs/how_to/charts.md
     """
     plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
-    pattern_names = ("weave", "capsize", "EP2") if plane.model.carrier is None else ("weave",)
+    pattern_names = ("weave", "capsize", "EP2") if not plane.model.is_complex else ("weave",)
     traces = (trace(plane, name, step=step, starts=starts, seed=seed, progress=progress) for name in pattern_names)
     branches_of = {t.pattern: [b for b in t.branches if not _lies_along_edge(b, plane)] for t in traces}
     start_steps(progress, "looking for corners")

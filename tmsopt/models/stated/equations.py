@@ -57,12 +57,11 @@ def _add_carrier(R: Matrix, carrier: float) -> Matrix:
     return [[x + Fraction(carrier) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(R)]
 
 
-def pencil(blocks: dict[str, Matrix], carrier: float = 0.0) -> Matrices:
-    """Matrices of the matrix polynomial, for descending powers; for H they belong to the real system with a carrier."""
+def pencil(blocks: dict[str, Matrix]) -> Matrices:
+    """Matrices of the matrix polynomial, for descending powers; for H they are I and i H, with pairs as entries."""
     if "H" in blocks:
-        R, J = blocks["H"], blocks[IMAGINARY_KEY]
-        S = _add_carrier(R, carrier)
-        A = [[*j, *r] for j, r in zip(J, S, strict=True)] + [[*(-x for x in r), *j] for j, r in zip(J, S, strict=True)]
+        parts = zip(blocks["H"], blocks[IMAGINARY_KEY], strict=True)
+        A: Matrix = [[Pair(y, -x) for x, y in zip(*rows, strict=True)] for rows in parts]
     elif "A" in blocks:
         A = blocks["A"]
     else:

@@ -6,9 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import flint
 import numpy as np
 
-from tmsopt.algebra.formula import Kind, constant, make_node
+from tmsopt.algebra.balls import complex_ball, is_ball
+from tmsopt.algebra.formula import Kind, Node, constant, make_node
 from tmsopt.algebra.kinds import NODES
 from tmsopt.models.names import FUNCTIONS
 from tmsopt.models.stated.degree import LARGEST_EXPONENT, DegreeTooHigh
@@ -84,6 +86,15 @@ def entry_pair(x: Any) -> Pair:
     if isinstance(x, complex | np.complexfloating):
         return Pair(float(x.real), float(x.imag))
     return x if isinstance(x, Pair) else Pair(x)
+
+
+def join(re: Any, im: Any) -> Any:
+    """The complex number of two real numbers: of two nodes a `Pair`, of balls or series a complex one."""
+    if isinstance(re, Node):
+        return Pair(re, im)
+    if is_ball(re) or is_ball(im):
+        return complex_ball(re) + complex_ball(im) * flint.acb(0, 1)
+    return re + 1j * im
 
 
 def is_real(x: Pair) -> bool:

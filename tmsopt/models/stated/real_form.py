@@ -14,8 +14,8 @@ import numpy as np
 from tmsopt.algebra.formula import Formula, Node, UnsupportedOperation, formula
 from tmsopt.algebra.intervals import Interval, ranges
 from tmsopt.algebra.kinds import values
-from tmsopt.models.model import Matrix, Model
-from tmsopt.records import AnyNumbers, Array
+from tmsopt.models.model import Model
+from tmsopt.records import Array
 
 # The spread is the largest distance of Re ω from the middle of all Re ω, and at least the largest |Im ω|.
 
@@ -53,7 +53,6 @@ def complex_model(
     carrier: float,
     bounds: Callable[[Mapping[str, Interval]], tuple[float, float]],
     with_carrier: Callable[[float], Model],
-    double: Callable[[AnyNumbers], tuple[Matrix, ...]],
 ) -> Model:
     """The model of a complex H from the model of its real system.
 
@@ -61,7 +60,6 @@ def complex_model(
         real: the model of the real system with the carrier.
         bounds: function from ranges of parameters to the middle and the spread of the eigenfrequencies.
         with_carrier: function from a carrier to the model of H with this carrier.
-        double: pencil of the real system without a carrier.
     """
 
     def choose_carrier(box: Mapping[str, Interval]) -> Model:
@@ -75,7 +73,6 @@ def complex_model(
         real_model,
         carrier=carrier,
         carried=choose_carrier,
-        double=double,
         words=WORDS,
         absent=ABSENT,
         conventions=CONVENTIONS,

@@ -33,7 +33,7 @@ from tmsopt.models.names import latex, name_fault, number_text, spell_formula
 from tmsopt.models.stated.closed_loop import LOOP_KEYS, check_loop, close_loop
 from tmsopt.models.stated.degree import first_fault
 from tmsopt.models.stated.equations import IMAGINARY_KEY, pencil, polynomial, sort_places, user_key
-from tmsopt.models.stated.pairs import complex_text
+from tmsopt.models.stated.pairs import Pair, complex_text, join
 from tmsopt.models.stated.real_form import complex_model, frequency_bounds
 from tmsopt.models.stated.texts import Unfit, describe_position, parse_entries
 from tmsopt.records import AnyNumbers
@@ -261,7 +261,7 @@ def _build_from_data(
         algebraic=dict,
         polynomial=lambda **numbers: values(coefficients, numbers),
         quantities=tuple(Quantity(n, "1", "quantity", latex(n), _make_function(x, names)) for n, x in quantities),
-        pencil=None if kind == "coefficients" else _matrices(pencil(blocks, carrier), names),
+        pencil=None if kind == "coefficients" else _matrices(pencil(blocks), names),
         origin=(_build_from_data, (*arguments, carrier) if carrier else arguments),
         statement=_statement(entry_formula, shapes, quantity_names),
         numbers=tuple(number_text(x) for x in entry_formula.constants if getattr(x, "denominator", 0) != 1),
@@ -273,7 +273,6 @@ def _build_from_data(
         carrier,
         frequency_bounds(entries[: len(entries) - len(quantity_names)]),
         lambda c: _build_from_data(*arguments, *([c] if c else [])),
-        _matrices(pencil(blocks), names),
     )
 
 
@@ -283,10 +282,17 @@ def _make_function(x: Any, names: Sequence[str]) -> Callable[[AnyNumbers], Any]:
 
 
 def _matrices(rows: Sequence[Matrix], names: Sequence[str]) -> Callable[[AnyNumbers], Matrices]:
-    """A function from named numbers to matrices, for matrices of nodes."""
-    n, entry_formula = len(rows[0]), formula((x for P in rows for row in P for x in row), names)
+    """A function from named numbers to matrices, for matrices of nodes or of pairs of nodes."""
+    n, entries = len(rows[0]), [x for P in rows for row in P for x in row]
+    parts = formula((y for x in entries for y in ((x.re, x.im) if isinstance(x, Pair) else (x,))), names)
     shapes = [(str(k), n, n) for k in range(len(rows))]
-    return lambda numbers: tuple(_split(iter(values(entry_formula, numbers)), shapes).values())
+
+    def evaluate(numbers: AnyNumbers) -> Matrices:
+        remaining = iter(values(parts, numbers))
+        joined = [join(next(remaining), next(remaining)) if isinstance(x, Pair) else next(remaining) for x in entries]
+        return tuple(_split(iter(joined), shapes).values())
+
+    return evaluate
 
 
 def _count_identical_zeros(kind: str, blocks: Mapping[str, Matrix], names: Sequence[str], max_count: int) -> int:

@@ -29,7 +29,7 @@ def vocabulary(model: Model, parameter_set: ParameterSet) -> dict[str, Parameter
         entries[n] = Quantity(n, "", meaning, f"a_{{{model.degree - k}}}", itemgetter(n))
     derived_quantities = (*model.quantities, *parameter_set.quantities, *ROOT_QUANTITIES, NO_RADIUS)
     entries |= {p.name: p for p in (*native, *parameter_set.parameters)} | {q.name: q for q in derived_quantities}
-    if model.carrier is not None:
+    if model.is_complex:
         entries["abscissa"] = replace(ROOT_QUANTITIES[0], meaning="largest Im omega, gain less loss")
     names = (*parameter_set.names, *public_names(model, parameter_set), *root_names(model))
     return {name: entries[name] for name in names}

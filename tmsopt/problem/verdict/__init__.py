@@ -1,7 +1,6 @@
 """Verdicts: describes a solution in words, from facts only.
 
-In: facts such as an abscissa, Jordan chains, a status. Out: a word or a phrase. Open `stability` first, then `status`;
-`meetings` finds the eigenvectors of multiple roots.
+In: facts such as an abscissa, Jordan chains, a status. Out: a word or a phrase. Open `stability` first, then `status`.
 """
 
 import lazy_loader

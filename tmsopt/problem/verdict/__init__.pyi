@@ -1,3 +1,2 @@
-from .meetings import located_meetings as located_meetings, meetings as meetings
 from .stability import MultipleRoot as MultipleRoot, describe_crossing as describe_crossing, stability as stability
 from .status import describe_status as describe_status, describe_verdict as describe_verdict

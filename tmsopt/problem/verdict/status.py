@@ -52,7 +52,7 @@ def describe_verdict(solution: "Solution") -> str:
             stability,
             is_exact=solution.edge_is_exact,
             has_matrices=model.pencil is not None,
-            is_complex=model.carrier is not None,
+            is_complex=model.is_complex,
         )
         return f"{words}; {remark}" if stability.on_edge and is_sought and remark else words
     if any_stable:

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from tmsopt.chains.meetings import nearest_crossing
 from tmsopt.errors import InputError
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem import Posed, Relaxation, Starts, move_limits, replace_limits
 from tmsopt.problem.advice.remedies import DIGITS
 from tmsopt.problem.dependence import STABILITY_CONSTRAINT, stability_limit
-from tmsopt.problem.verdict.meetings import nearest_crossing
 from tmsopt.program import Options
 from tmsopt.program.formulate import default_start, formulate
 from tmsopt.progress import begin

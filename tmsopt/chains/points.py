@@ -1,0 +1,371 @@
+"""Designs at which eigenvalues coincide with one eigenvector, by Newton steps on clusters and on Jordan chains.
+
+A pattern asks for one or several multiple eigenvalues. From any design, two stages find them. The first brings k
+eigenvalues together, by steps in the parameters for the power sums of their distances from their mean. The second
+solves the equations of the Jordan chain for the parameters and the eigenvalue, to all digits. Both use least squares,
+so that conditions that a symmetry fulfils for all parameters do no harm.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from tmsopt.chains.family import Family
+from tmsopt.records import Array, Complex
+from tmsopt.roots import composition
+from tmsopt.roots.chains import (
+    MIN_SECOND_VALUE,
+    Chain,
+    Cluster,
+    eigenvalues_of,
+    find_borders,
+    linearise,
+    linearised_slopes,
+    make_chain,
+    make_cluster,
+    size_at,
+)
+
+MAX_BACKWARD_ERROR = 1e-12
+"""Largest relative change of the matrices that makes the chain of a found design exact."""
+
+_MAX_CLUSTER_STEPS = 60
+_CLOSE = 1e-3  # a spread below this share of the size of the eigenvalues ends the first stage
+_MIN_DAMPING = 1e-3
+_DECREASE = 0.1  # share of the predicted decrease that a damped step must reach
+_MAX_CHAIN_STEPS = 40
+_STALLED_STEPS = 3  # steps without a smaller residual that end the second stage
+_PROGRESS = 0.5  # a step that leaves more than this share of the error has stalled
+_STILL = 4e-16  # a step of this share of the ranges, and an error of this size, are at rounding
+_CUTOFF = 1e-12  # relative singular values below this count as 0 in a step
+_MAX_STEP = 0.5  # longest step of a parameter in the second stage, as a share of its range
+_DISTINCT = 1e-6  # relative distance below which two eigenvalues of a pattern are one
+
+_NO_SUMS = np.zeros(0, dtype=complex)
+
+Axis = Literal["complex", "real", "imaginary", "zero"]
+
+
+@dataclass(frozen=True)
+class Target:
+    """One multiple eigenvalue that a pattern asks for.
+
+    Attributes:
+        order: length of the chain.
+        axis: where the eigenvalue lies; ``complex`` is anywhere, for real matrices above the real axis.
+    """
+
+    order: int
+    axis: Axis
+
+    @property
+    def directions(self) -> tuple[complex, ...]:
+        """Directions in which the eigenvalue may move."""
+        return {"complex": (1, 1j), "real": (1,), "imaginary": (1j,), "zero": ()}[self.axis]
+
+    def is_real(self, family: Family) -> bool:
+        """Whether the eigenvalue and its chain are real."""
+        return not family.is_complex and self.axis in ("real", "zero")
+
+    def conditions(self, family: Family) -> int:
+        """Number of conditions on the parameters."""
+        return (1 if self.is_real(family) else 2) * self.order - len(self.directions)
+
+
+def targets_of(name: str, is_complex: bool) -> tuple[Target, ...]:
+    """The multiple eigenvalues of a pattern such as ``EP3`` or ``EP2+weave``, for real or complex matrices."""
+    anywhere: Axis = "complex" if is_complex else "real"
+    axes: dict[str, Axis] = {"EP": anywhere, "CEP": "complex", "weave": "imaginary", "resonance": "imaginary"}
+    return tuple(
+        Target(2 if kind == "resonance" else order, axes.get(kind, "zero"))
+        for kind, order, count in composition(name)
+        for _ in range(count)
+    )
+
+
+@dataclass(frozen=True)
+class ExceptionalPoint:
+    """A design with its multiple eigenvalues.
+
+    Attributes:
+        p: values of the free parameters.
+        chains: the chain of each target.
+        backward_error: largest relative change of the matrices that makes a chain exact.
+        second_value: least second smallest singular value, relative to the size of the matrices.
+        steps: steps of the two stages.
+    """
+
+    p: Array
+    chains: tuple[Chain, ...]
+    backward_error: float
+    second_value: float
+    steps: tuple[int, int] = (0, 0)
+
+    @property
+    def roots(self) -> tuple[complex, ...]:
+        """The multiple eigenvalues, in the unit of the family."""
+        return tuple(chain.s for chain in self.chains)
+
+    @property
+    def is_defective(self) -> bool:
+        """Whether each multiple eigenvalue has one eigenvector."""
+        return self.second_value > MIN_SECOND_VALUE
+
+    @property
+    def is_found(self) -> bool:
+        """Whether the point is a solution to rounding, with one eigenvector for each multiple eigenvalue."""
+        return self.is_defective and self.backward_error <= MAX_BACKWARD_ERROR
+
+
+def find_point(
+    family: Family, targets: Sequence[Target], start: Array, rng: np.random.Generator | None = None
+) -> ExceptionalPoint | None:
+    """The point that the two stages reach from a design; None if they fail.
+
+    Args:
+        rng: chooses which eigenvalues shall coincide; by default those that are nearest each other.
+    """
+    with np.errstate(all="ignore"):
+        try:
+            gathered = _gather(family, targets, np.clip(start, *family.box.T), rng)
+            return (
+                gathered
+                if gathered is None
+                else refine(family, targets, gathered.p, gathered.means, start, gathered.steps)
+            )
+        except np.linalg.LinAlgError:
+            return None
+
+
+@dataclass(frozen=True)
+class _Gathered:
+    """A step of the first stage: the clusters of a design, what separates their eigenvalues, and its slopes."""
+
+    p: Array
+    clusters: tuple[Cluster, ...]
+    residual: Array
+    jacobian: Array
+    steps: int = 0
+
+    @property
+    def means(self) -> tuple[complex, ...]:
+        """The mean of each cluster."""
+        return tuple(cluster.mean for cluster in self.clusters)
+
+    def largest_distance(self, targets: Sequence[Target]) -> float:
+        """Largest distance of an eigenvalue from the mean of its cluster, or of a mean from its axis."""
+        pairs = zip(self.clusters, targets, strict=True)
+        return max(float(c.radius) + float(abs(_stack(c.mean, _NO_SUMS, t)[0])) for c, t in pairs)
+
+
+def _gather(
+    family: Family, targets: Sequence[Target], start: Array, rng: np.random.Generator | None
+) -> _Gathered | None:
+    """Bring the eigenvalues of each target together, by damped Gauss–Newton steps in the box."""
+    eigenvalues = eigenvalues_of(family.matrices(start))
+    size = float(np.abs(eigenvalues - eigenvalues.mean()).max() or np.abs(eigenvalues).max()) or 1.0
+    groups: Sequence[Complex | None] | None = _choose_groups(eigenvalues, targets, family, rng)
+    state = groups and _measure(family, targets, start, groups, size)
+    while state and state.steps < _MAX_CLUSTER_STEPS:
+        if state.largest_distance(targets) <= _CLOSE * size:
+            break
+        step, damping = _step_in_box(state.jacobian, state.residual, state.p, family), 1.0
+        while damping > _MIN_DAMPING:
+            p = np.clip(state.p + damping * step, *family.box.T)
+            eigenvalues = eigenvalues_of(family.matrices(p))
+            groups = [_nearest(eigenvalues, mean, t, family) for mean, t in zip(state.means, targets, strict=True)]
+            trial = _measure(family, targets, p, groups, size)
+            if trial and np.linalg.norm(trial.residual) <= (1 - _DECREASE * damping) * np.linalg.norm(state.residual):
+                break
+            damping /= 2
+        else:
+            break
+        assert trial is not None
+        state = replace(trial, steps=state.steps + 1)
+    return state or None
+
+
+def _measure(
+    family: Family, targets: Sequence[Target], p: Array, groups: Sequence[Complex | None], size: float
+) -> _Gathered | None:
+    """The clusters of groups of eigenvalues, their power sums and distances from the axes in powers of `size`."""
+    matrices, slopes = family.expand(p)
+    M, changes = linearise(matrices), linearised_slopes(matrices, slopes)
+    clusters = [cluster for group in groups if group is not None and (cluster := make_cluster(M, group))]
+    if len(clusters) < len(groups):
+        return None
+    residual, jacobian = list[Array](), list[Array]()
+    for cluster, target in zip(clusters, targets, strict=True):
+        scale = size ** -np.arange(1.0, target.order + 1)
+        responses = [cluster.respond(change) for change in changes]
+        rows = np.array([_stack(cluster.mean, cluster.power_sums, target), *(_stack(*r, target) for r in responses)])
+        rows = (rows * scale).T
+        parts = rows.real if target.is_real(family) else np.concatenate([rows.real, rows.imag])
+        residual.append(parts[:, 0])
+        jacobian.append(parts[:, 1:])
+    return _Gathered(p, tuple(clusters), np.concatenate(residual), np.concatenate(jacobian))
+
+
+def _stack(mean: complex, power_sums: Complex, target: Target) -> Complex:
+    """The distance of the mean from the axis of a target, and the power sums."""
+    distance = {"imaginary": mean.real, "zero": mean}.get(target.axis, 0.0)
+    return np.array([distance, *power_sums], dtype=complex)
+
+
+def _choose_groups(
+    eigenvalues: Complex, targets: Sequence[Target], family: Family, rng: np.random.Generator | None
+) -> list[Complex] | None:
+    """The eigenvalues that shall coincide, one group for each target, without common ones; None if there are too few.
+
+    The highest order chooses first. Without `rng` it takes the group with the least spread.
+    """
+    groups, left = dict[int, Complex](), eigenvalues
+    for k in sorted(range(len(targets)), key=lambda k: -targets[k].order):
+        target = targets[k]
+        candidates = [g for z in left if (g := _nearest(left, z, target, family)) is not None]
+        if not candidates:
+            return None
+        spreads = [np.abs(g - g.mean()).max() + abs(_stack(g.mean(), _NO_SUMS, target)[0]) for g in candidates]
+        groups[k] = candidates[int(np.argmin(spreads) if rng is None else rng.integers(len(candidates)))]
+        left = left[~np.isin(left, groups[k])]
+    return [groups[k] for k in range(len(targets))]
+
+
+def _nearest(eigenvalues: Complex, z: complex, target: Target, family: Family) -> Complex | None:
+    """The eigenvalues of a target that are nearest to z; None if there are too few.
+
+    For real matrices, a real target takes conjugate eigenvalues together, and any other target those above the axis.
+    """
+    z = {"imaginary": 1j * z.imag, "zero": 0j}.get(target.axis, z)
+    if family.is_complex:
+        pool = eigenvalues
+    elif target.is_real(family):
+        z, group = complex(z.real), list[complex]()
+        for w in eigenvalues[np.argsort(np.abs(eigenvalues - z), kind="stable")]:
+            both = [w] if w.imag == 0 else [w, w.conjugate()] if w.imag > 0 else []
+            group += both if len(group) + len(both) <= target.order else []
+        return np.array(group) if len(group) == target.order else None
+    else:
+        pool, z = eigenvalues[eigenvalues.imag > 0], complex(z.real, abs(z.imag))
+    return pool[np.argsort(np.abs(pool - z), kind="stable")[: target.order]] if len(pool) >= target.order else None
+
+
+def _step_in_box(jacobian: Array, residual: Array, p: Array, family: Family) -> Array:
+    """A Gauss–Newton step, of least length in shares of the ranges; a parameter at its limit does not move outwards."""
+    free = np.ones(len(p), dtype=bool)
+    step = np.zeros(len(p))
+    while free.any():
+        scaled = jacobian[:, free] * family.widths[free]
+        step[:] = 0.0
+        step[free] = np.linalg.lstsq(scaled, -residual, rcond=_CUTOFF)[0] * family.widths[free]
+        blocked = free & (((p <= family.box[:, 0]) & (step < 0)) | ((p >= family.box[:, 1]) & (step > 0)))
+        if not blocked.any():
+            break
+        free &= ~blocked
+    return step if free.any() else np.zeros(len(p))
+
+
+def refine(
+    family: Family,
+    targets: Sequence[Target],
+    p: Array,
+    roots: Sequence[complex],
+    nearest_to: Array | None = None,
+    steps_before: int = 0,
+) -> ExceptionalPoint | None:
+    """Solve the equations of the chains by Gauss–Newton steps in the parameters and the eigenvalues.
+
+    Args:
+        nearest_to: a design. If the conditions leave freedom, the point nearest to it is found, in shares of the
+            ranges; by default the one nearest to p.
+    """
+    roots = [_project(s, target) for s, target in zip(roots, targets, strict=True)]
+    best, stalled = None, 0
+    borders = [find_borders(family.matrices(p), s)[0] for s in roots]
+    for step_count in range(_MAX_CHAIN_STEPS):  # noqa: B007 - the number of steps is told
+        equations = _chain_equations(family, targets, p, roots, borders)
+        borders = [chain.borders for chain in equations.chains]
+        if best is None or equations.error < _PROGRESS * best.error:
+            stalled = 0
+        else:
+            stalled += 1
+        if best is None or equations.error <= best.error:
+            best = equations
+        pull = np.zeros(len(p)) if nearest_to is None else (nearest_to - p) / family.widths
+        step, moves = _chain_step(equations, targets, family, pull)
+        is_still = np.abs(step).max(initial=0.0) <= _STILL
+        if not np.isfinite(step).all() or stalled >= _STALLED_STEPS or (is_still and equations.error <= _STILL):
+            break
+        p = p + np.clip(step, -_MAX_STEP, _MAX_STEP) * family.widths
+        roots = [s + move for s, move in zip(roots, moves, strict=True)]
+    assert best is not None
+    seconds = [
+        find_borders(family.matrices(best.p), c.s)[2] / size_at(family.matrices(best.p), c.s) for c in best.chains
+    ]
+    return ExceptionalPoint(best.p, best.chains, best.error, min(seconds), (steps_before, step_count))
+
+
+@dataclass(frozen=True)
+class _ChainEquations:
+    """The equations of the chains at a design: residuals, slopes with respect to parameters and eigenvalues."""
+
+    p: Array
+    chains: tuple[Chain, ...]
+    residual: Array
+    slopes: Array
+    root_slopes: Array
+    error: float
+
+
+def _chain_equations(
+    family: Family,
+    targets: Sequence[Target],
+    p: Array,
+    roots: Sequence[complex],
+    borders: Sequence[tuple[Complex, Complex]],
+) -> _ChainEquations:
+    matrices, slopes = family.expand(p)
+    chains = tuple(make_chain(matrices, s, t.order, b) for s, t, b in zip(roots, targets, borders, strict=True))
+    residual, rows, root_rows, errors = list[Array](), list[Array](), list[Array](), list[float]()
+    for chain, target in zip(chains, targets, strict=True):
+        size = size_at(matrices, chain.s)
+        columns = [chain.residuals, *(chain.respond(change) for change in slopes)]
+        columns += [chain.slopes * direction for direction in target.directions]
+        table = np.array(columns).T / size
+        parts = table.real if target.is_real(family) else np.concatenate([table.real, table.imag])
+        residual.append(parts[:, 0])
+        rows.append(parts[:, 1 : 1 + len(p)])
+        root_rows.append(parts[:, 1 + len(p) :])
+        errors.append(chain.backward_error(size))
+    width = sum(part.shape[1] for part in root_rows)
+    root_slopes, row, column = np.zeros((sum(map(len, residual)), width)), 0, 0
+    for part in root_rows:
+        root_slopes[row : row + len(part), column : column + part.shape[1]] = part
+        row, column = row + len(part), column + part.shape[1]
+    return _ChainEquations(p, chains, np.concatenate(residual), np.concatenate(rows), root_slopes, max(errors))
+
+
+def _chain_step(
+    equations: _ChainEquations, targets: Sequence[Target], family: Family, pull: Array
+) -> tuple[Array, list[complex]]:
+    """The step of the parameters in shares of their ranges, and the moves of the eigenvalues.
+
+    Args:
+        pull: the way to the design that the point shall be nearest to, followed as far as the conditions leave freedom.
+    """
+    slopes = equations.slopes * family.widths
+    basis = np.linalg.qr(equations.root_slopes, mode="complete")[0][:, equations.root_slopes.shape[1] :]
+    reduced, right = basis.T @ slopes, -basis.T @ equations.residual
+    has_freedom = len(right) < len(pull)
+    wanted = pull if has_freedom else np.zeros(len(pull))
+    step = wanted + np.linalg.lstsq(reduced, right - reduced @ wanted, rcond=_CUTOFF)[0]
+    rest = -equations.residual - slopes @ step
+    moves = iter(np.linalg.lstsq(equations.root_slopes, rest, rcond=_CUTOFF)[0].tolist())
+    return step, [sum((d * next(moves) for d in target.directions), 0j) for target in targets]
+
+
+def _project(s: complex, target: Target) -> complex:
+    """The point of the axis of a target that is nearest to s."""
+    return {"real": complex(s.real), "imaginary": 1j * s.imag, "zero": 0j}.get(target.axis, s)

@@ -1,0 +1,252 @@
+"""The Jordan chain of an eigenvalue of a matrix polynomial, with its vectors eliminated, and clusters of eigenvalues.
+
+Let L(s) = Σ Pₖ s^(d−k), and let b and c be vectors such that the bordered matrix B(s) = [[L(s), b], [c*, 0]] is regular
+near λ. Then B(λ + t) (x(t); F(t)) = (0; 1) defines power series x(t) and F(t) = −det L/det B. So λ is a k-fold
+eigenvalue with one eigenvector if and only if F₀ = … = F₍ₖ₋₁₎ = 0, and then x₀ … x₍ₖ₋₁₎ is its Jordan chain. The
+series F is smooth in λ and in the entries of L, also where the eigenvalue is multiple (Govaerts, Numerical Methods for
+Bifurcations of Dynamical Equilibria, SIAM 2000, chapter 3).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import comb
+from typing import Any
+
+import numpy as np
+
+from tmsopt.records import Array, Complex
+
+MIN_SECOND_VALUE = 1e-10
+"""Least second smallest singular value of L(λ), relative to the size of L, for a single eigenvector."""
+
+
+def expand(matrices: Any, s: Any, count: int) -> list[Any]:
+    """Taylor coefficients L(s), L′(s), L″(s)/2 … of a matrix polynomial: at most `count`, none beyond its degree.
+
+    Args:
+        matrices: Pₖ in descending powers, of numbers of any kind.
+    """
+    d = len(matrices) - 1
+    return [
+        sum(comb(d - k, j) * s ** (d - k - j) * matrices[k] for k in range(d - j + 1)) for j in range(min(d + 1, count))
+    ]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The power series x(t), y(t) and F(t) of a matrix polynomial at λ.
+
+    Attributes:
+        s: λ.
+        terms: Taylor coefficients of L at λ.
+        values: F₀ … Fₖ.
+        right, left: x₀ … x₍ₖ₋₁₎ and y₀ … y₍ₖ₋₁₎ as rows, shape (k, n); y is the series of the transposed matrices.
+    """
+
+    s: complex
+    terms: Sequence[Complex]
+    values: Complex
+    right: Complex
+    left: Complex
+
+    @property
+    def order(self) -> int:
+        """Length of the chain."""
+        return len(self.right)
+
+    @cached_property
+    def unit(self) -> float:
+        """The unit u of t in which the first and the last vector of the chain, x₀ and x_j u^j, have the same length."""
+        first, *_, last = np.linalg.norm(self.right[[0, 0, -1]], axis=1)
+        growth = last / first
+        return float(growth ** (-1 / (self.order - 1))) if self.order > 1 and 0 < growth < np.inf else 1.0
+
+    @property
+    def powers(self) -> Array:
+        """1, u, u² …, one for each vector."""
+        return np.asarray(self.unit ** np.arange(self.order))
+
+    @property
+    def borders(self) -> tuple[Complex, Complex]:
+        """b and c for the next step: the unit vectors of the left and the right eigenvector."""
+        b, c = self.left[0].conj(), self.right[0]
+        return b / np.linalg.norm(b), c / np.linalg.norm(c)
+
+    @property
+    def residuals(self) -> Complex:
+        """F_j u^j for j < k."""
+        return np.asarray(self.values[:-1] * self.powers)
+
+    @property
+    def slopes(self) -> Complex:
+        """Derivatives of the residuals with respect to λ."""
+        return np.asarray(self.values[1:] * np.arange(1, self.order + 1) * self.powers)
+
+    def respond(self, change: Complex) -> Complex:
+        """Derivatives of the residuals for a change of the matrices, −Σ y_a D_i x_c over a + i + c = j.
+
+        Args:
+            change: derivatives of Pₖ, in descending powers.
+        """
+        total = np.zeros(self.order, dtype=complex)
+        for i, D in enumerate(expand(change, self.s, self.order)):
+            products = self.left @ D @ self.right.T
+            for j in range(i, self.order):
+                total[j] -= np.trace(products[: j - i + 1, : j - i + 1][:, ::-1])
+        return np.asarray(total * self.powers)
+
+    def backward_error(self, size: float) -> float:
+        """Size of a change of the matrices, relative to `size`, after which λ has exactly this chain.
+
+        The change is −Σ F_j b w_j*, where w_j are dual to the vectors of the chain, in all powers of s.
+        """
+        count = min(len(self.terms) - 1, self.order)
+        padded = np.concatenate([np.zeros((count, len(self.right[0]))), self.right * self.powers[:, None]])
+        stacked = np.hstack([padded[count - i : len(padded) - i] for i in range(max(count, 1))])
+        dual = np.linalg.pinv(stacked)
+        return float(np.linalg.norm(dual @ self.residuals)) / size
+
+
+def make_chain(matrices: Complex, s: complex, order: int, borders: tuple[Complex, Complex]) -> Chain:
+    """The chain of a matrix polynomial at s.
+
+    Args:
+        borders: b and c, see `find_borders`.
+
+    Raises:
+        LinAlgError: if the bordered matrix is singular or not finite.
+    """
+    terms = expand(matrices, s, order + 1)
+    b, c = borders
+    n = len(b)
+    bordered = np.zeros((n + 1, n + 1), dtype=complex)
+    bordered[:n, :n], bordered[:n, n], bordered[n, :n] = terms[0], b, c.conj()
+    if not np.isfinite(bordered).all():
+        raise np.linalg.LinAlgError("the matrices are not finite")
+    inverse = np.asarray(np.linalg.inv(bordered), dtype=complex)
+
+    def solve_series(inverse: Complex, terms: Sequence[Complex], count: int) -> Complex:
+        series = np.zeros((count, n + 1), dtype=complex)
+        series[0] = inverse[:, n]
+        for j in range(1, count):
+            right_side = sum(terms[i] @ series[j - i, :n] for i in range(1, min(len(terms) - 1, j) + 1))
+            series[j] = -inverse[:, :n] @ right_side
+        return series
+
+    right = solve_series(inverse, terms, order + 1)
+    left = solve_series(inverse.T, [D.T for D in terms], order)
+    return Chain(s, terms, right[:, n], right[:order, :n], left[:, :n])
+
+
+def find_borders(matrices: Complex, s: complex) -> tuple[tuple[Complex, Complex], float, float]:
+    """The singular vectors b and c of the smallest singular value of L(s), and the two smallest singular values.
+
+    For 1 × 1 matrices the second one is infinite.
+    """
+    U, values, V = np.linalg.svd(expand(matrices, s, 1)[0])
+    return (U[:, -1], V[-1].conj()), float(values[-1]), float(values[-2]) if len(values) > 1 else np.inf
+
+
+def size_at(matrices: Complex, s: complex) -> float:
+    """Size of the terms of L(s)."""
+    d = len(matrices) - 1
+    return float(sum(abs(s) ** (d - k) * np.linalg.norm(P, 2) for k, P in enumerate(matrices))) or 1.0
+
+
+def linearise(matrices: Complex) -> Complex:
+    """The matrix with the same eigenvalues, of shape (d n, d n). Its last n rows are −P₀⁻¹ (P_d … P₁).
+
+    Raises:
+        LinAlgError: if P₀ is singular.
+    """
+    d, n = len(matrices) - 1, len(matrices[0])
+    M = np.eye(d * n, k=n, dtype=complex)
+    M[-n:] = -np.linalg.solve(matrices[0], np.hstack(list(matrices[:0:-1])))
+    return M
+
+
+def eigenvalues_of(matrices: Complex) -> Complex:
+    """The eigenvalues of a matrix polynomial with a regular leading matrix."""
+    return np.asarray(np.linalg.eigvals(linearise(matrices)), dtype=complex)
+
+
+def linearised_slopes(matrices: Complex, slopes: Complex) -> Complex:
+    """Derivatives of the last n rows of the linearised matrix, shape (m, n, d n).
+
+    Args:
+        slopes: derivatives of the matrices with respect to m parameters, shape (m, d + 1, n, n).
+    """
+    last_rows = linearise(matrices)[-len(matrices[0]) :]
+    changes = np.array([np.hstack(list(change[:0:-1])) + change[0] @ last_rows for change in slopes])
+    return -np.linalg.solve(matrices[0], changes) if len(slopes) else changes
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Some eigenvalues of a matrix, by the Schur form of their invariant subspace.
+
+    Attributes:
+        mean: mean of the eigenvalues.
+        block: the Schur block of the eigenvalues minus their mean, shape (k, k).
+        right, left: bases X (n, k) and Y (k, n) of the invariant subspaces with Y X = I.
+    """
+
+    mean: complex
+    block: Complex
+    right: Complex
+    left: Complex
+
+    @property
+    def radius(self) -> float:
+        """Largest distance of an eigenvalue from the mean."""
+        return float(np.abs(np.diag(self.block)).max())
+
+    @property
+    def powers(self) -> list[Complex]:
+        """1, D, D² … of the block D."""
+        powers = [np.eye(len(self.block), dtype=complex)]
+        for _ in range(len(self.block)):
+            powers.append(powers[-1] @ self.block)
+        return powers
+
+    @property
+    def power_sums(self) -> Complex:
+        """Σ (λ_i − mean)^j for j = 2 … k, which are 0 if and only if the eigenvalues coincide."""
+        return np.array([np.trace(P) for P in self.powers[2:]], dtype=complex)
+
+    def respond(self, change: Complex) -> tuple[complex, Complex]:
+        """Derivatives of the mean and of the power sums for a change of the last rows of the matrix."""
+        change_of_block = self.left[:, -len(change) :] @ change @ self.right
+        k = len(self.block)
+        change_of_mean = complex(np.trace(change_of_block)) / k
+        centred = change_of_block - change_of_mean * np.eye(k)
+        sums = [j * np.trace(P @ centred) for j, P in enumerate(self.powers[1:k], start=2)]
+        return change_of_mean, np.array(sums, dtype=complex)
+
+
+def make_cluster(matrix: Complex, eigenvalues: Complex) -> Cluster | None:
+    """The cluster of the given eigenvalues of a matrix; None if the Schur form does not separate them.
+
+    Example:
+        >>> cluster = tmsopt.roots.make_cluster(np.diag([1.0, 1.5, 9.0]).astype(complex), np.array([1.0, 1.5]))
+        >>> cluster.mean, cluster.spread
+        ((1.25+0j), 0.25)
+
+    More: docs/explanation/jordan_chains.md
+    """
+    from scipy.linalg import schur, solve_sylvester
+
+    k, all_eigenvalues = len(eigenvalues), np.linalg.eigvals(matrix)
+    distances = np.abs(all_eigenvalues[:, None] - eigenvalues).min(axis=1)
+    order = np.sort(distances)
+    limit = (order[k - 1] + order[k]) / 2 if k < len(matrix) else np.inf
+    sorted_schur: Any = schur  # its types leave out a function of complex numbers
+    T, Q, count = sorted_schur(matrix, output="complex", sort=lambda z: bool(np.abs(z - eigenvalues).min() <= limit))
+    if count != k:
+        return None
+    block, left = T[:k, :k], Q.conj().T
+    if k < len(matrix):
+        left = np.hstack([np.eye(k), solve_sylvester(block, -T[k:, k:], T[:k, k:])]) @ left
+    mean = complex(np.trace(block)) / k
+    return Cluster(mean, block - mean * np.eye(k), Q[:, :k], left)
