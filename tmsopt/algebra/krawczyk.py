@@ -42,7 +42,9 @@ class Enclosure:
 
 
 def jacobian(system: System, point: Mapping[str, Any], names: Sequence[str]) -> Any:
-    """Jacobian of a system, with one column for each of `names`, by power series of first order."""
+    """Jacobian of a system, with one column for each of `names`: its own, or by power series of first order."""
+    if own_jacobian := getattr(system, "jacobian", None):
+        return own_jacobian(point, names)
     columns = [system({**point, n: flint.arb_series([point[n], 1], prec=2)}) for n in names]
     rows = zip(*columns, strict=True)
     return flint.arb_mat([[v[1] if isinstance(v, flint.arb_series) else flint.arb(0) for v in row] for row in rows])
@@ -104,7 +106,10 @@ def enclose_solution(
         """K(X) for the box of these radii, if it lies in the interior of the box."""
         offsets = [flint.arb(0, r.upper()) for r in radii]
         box = {n: middle[n] + a for n, a in zip(names, offsets, strict=True)}  # rounding makes it no smaller
-        contraction = identity - inverse * jacobian(system, {**middle, **box}, names)
+        try:
+            contraction = identity - inverse * jacobian(system, {**middle, **box}, names)
+        except ProofFailed:  # the equations have no derivatives somewhere in the box
+            return None
         images = (contraction * flint.arb_mat([[a] for a in offsets]) - step).entries()
         if not all(a.contains_interior(image) for a, image in zip(offsets, images, strict=True)):
             return None

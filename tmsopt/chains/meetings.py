@@ -11,6 +11,7 @@ import flint
 import numpy as np
 
 from tmsopt.chains.family import family_of
+from tmsopt.chains.points import gather_roots, measure_point, targets_of
 from tmsopt.models.user_spectrum import user_roots
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.stability import MultipleRoot
@@ -18,7 +19,6 @@ from tmsopt.records import Numbers
 from tmsopt.roots import Pattern, Root, jordan
 from tmsopt.roots.chains import expand
 from tmsopt.roots.jordan import equilibrate
-from tmsopt.roots.patterns.structure import fit_unknowns
 
 _RANK_TOLERANCE = 1e-10  # a relative singular value below this counts as 0
 # Singular values below this may be 0 at a nearby design; those of a double root are at most about √1e-10.
@@ -35,11 +35,15 @@ def meetings(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> tupl
 
     The rightmost root comes first.
     """
+    return _find_all_eigenvectors(problem, parameters, user_roots(problem.model, roots))
+
+
+def _find_all_eigenvectors(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
     multiple_roots: list[MultipleRoot] = []
-    is_complex, all_roots = problem.model.is_complex, user_roots(problem.model, roots)
-    for root in all_roots:
+    is_complex = problem.model.is_complex
+    for root in roots:
         if root.multiplicity > 1 and (is_complex or root.im >= 0):
-            meeting = _find_eigenvectors(problem, parameters, root, all_roots)
+            meeting = _find_eigenvectors(problem, parameters, root, roots)
             multiple_roots += [meeting] if is_complex or not root.im else [meeting, replace(meeting, im=-root.im)]
     return tuple(sorted(multiple_roots, key=lambda m: (-m.re, -m.im)))
 
@@ -49,25 +53,34 @@ def is_crossing(problem: Posed, pattern: Pattern, parameters: Numbers) -> bool:
     return any(not m.exceptional for m in located_meetings(problem, pattern, parameters))
 
 
+def mismatch(problem: Posed, pattern: Pattern, parameters: Numbers) -> float:
+    """Least relative change of the matrices of a design that gives it a pattern with its Jordan chains.
+
+    inf if an eigenvalue has several eigenvectors.
+    """
+    family, targets = family_of(problem, parameters), targets_of(pattern.name, problem.model.is_complex)
+    point = measure_point(family, targets, np.array([float(parameters[n]) for n in problem.free]))
+    return point.backward_error if point is not None and point.is_defective else np.inf
+
+
 def located_meetings(problem: Posed, pattern: Pattern, parameters: Numbers) -> tuple[MultipleRoot, ...]:
-    """The multiple roots of a pattern with ``EP`` in its name; none without matrices."""
-    if problem.model.pencil is None or "EP" not in pattern.name:
+    """The multiple roots of a pattern; none without matrices."""
+    if problem.model.pencil is None:
         return ()
-    return meetings(problem, parameters, _located_roots(problem, pattern, parameters))
+    return _find_all_eigenvectors(problem, parameters, _located_roots(problem, pattern, parameters))
 
 
 def _located_roots(problem: Posed, pattern: Pattern, parameters: Numbers) -> list[Root]:
-    """The multiple roots of the nearest polynomial of a pattern."""
-    try:
-        (unknowns, *_) = fit_unknowns(pattern, np.array([float(c) for c in problem.values(parameters).coefficients]))
-    except ValueError:
+    """The means of the eigenvalues that come nearest to the multiple roots of a pattern."""
+    family = family_of(problem, parameters).at(np.array([float(parameters[n]) for n in problem.free]))
+    targets = targets_of(pattern.name, problem.model.is_complex)
+    means = gather_roots(family, targets)
+    if means is None:
         return []
     return [
-        Root(float(z.real), float(z.imag) if abs(z.imag) > 0 else 0.0, count)
-        for factor, count in pattern.distinct_factors(unknowns)
-        if not ("resonance" in pattern.form and len(factor) > 2 and factor[1] == 0)
-        for z in np.roots(np.array(factor, dtype=float))
-        if count > 1
+        Root(float(s.real), float(s.imag), target.order)
+        for s, target in zip(means, targets, strict=True)
+        if target.order > 1
     ]
 
 
@@ -94,7 +107,7 @@ def _number(root: Root | MultipleRoot) -> complex:
 
 def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Numbers) -> dict[str, float]:
     """The parameters near a design at which its located roots cross, more accurate than from the coefficients."""
-    roots = user_roots(problem.model, _located_roots(problem, pattern, parameters))
+    roots = _located_roots(problem, pattern, parameters)
     root = max(roots, key=lambda r: r.multiplicity)
     crossing, _ = _find_crossing(
         problem, parameters, _number(root), root.multiplicity, _unit(problem, parameters, root, roots)

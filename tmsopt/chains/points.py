@@ -35,11 +35,11 @@ _MAX_CLUSTER_STEPS = 60
 _CLOSE = 1e-3  # a spread below this share of the size of the eigenvalues ends the first stage
 _MIN_DAMPING = 1e-3
 _DECREASE = 0.1  # share of the predicted decrease that a damped step must reach
-_MAX_CHAIN_STEPS = 40
+_MAX_CHAIN_STEPS = 60
 _STALLED_STEPS = 3  # steps without a smaller residual that end the second stage
 _PROGRESS = 0.5  # a step that leaves more than this share of the error has stalled
 _STILL = 4e-16  # a step of this share of the ranges, and an error of this size, are at rounding
-_CUTOFF = 1e-12  # relative singular values below this count as 0 in a step
+_CUTOFF = 1e-10  # relative singular values below this count as 0 in a step
 _MAX_STEP = 0.5  # longest step of a parameter in the second stage, as a share of its range
 _DISTINCT = 1e-6  # relative distance below which two eigenvalues of a pattern are one
 
@@ -65,13 +65,13 @@ class Target:
         """Directions in which the eigenvalue may move."""
         return {"complex": (1, 1j), "real": (1,), "imaginary": (1j,), "zero": ()}[self.axis]
 
-    def is_real(self, family: Family) -> bool:
-        """Whether the eigenvalue and its chain are real."""
-        return not family.is_complex and self.axis in ("real", "zero")
+    def is_real(self, is_complex: bool) -> bool:
+        """Whether the eigenvalue and its chain are real, for real or complex matrices."""
+        return not is_complex and self.axis in ("real", "zero")
 
-    def conditions(self, family: Family) -> int:
+    def conditions(self, is_complex: bool) -> int:
         """Number of conditions on the parameters."""
-        return (1 if self.is_real(family) else 2) * self.order - len(self.directions)
+        return (1 if self.is_real(is_complex) else 2) * self.order - len(self.directions)
 
 
 def targets_of(name: str, is_complex: bool) -> tuple[Target, ...]:
@@ -129,14 +129,21 @@ def find_point(
     """
     with np.errstate(all="ignore"):
         try:
-            gathered = _gather(family, targets, np.clip(start, *family.box.T), rng)
-            return (
-                gathered
-                if gathered is None
-                else refine(family, targets, gathered.p, gathered.means, start, gathered.steps)
-            )
+            state = _gather(family, targets, np.clip(start, *family.box.T), rng)
+            return None if state is None else refine(family, targets, state.p, state.means, start, state.steps)
         except np.linalg.LinAlgError:
             return None
+
+
+def gather_roots(family: Family, targets: Sequence[Target]) -> tuple[complex, ...] | None:
+    """The means of the eigenvalues that come nearest to the targets, for a family without parameters."""
+    try:
+        state = _gather(family, targets, np.empty(0), None)
+    except np.linalg.LinAlgError:
+        return None
+    if state is None:
+        return None
+    return tuple(_project(s, target) for s, target in zip(state.means, targets, strict=True))
 
 
 @dataclass(frozen=True)
@@ -166,8 +173,8 @@ def _gather(
     """Bring the eigenvalues of each target together, by damped Gauss–Newton steps in the box."""
     eigenvalues = eigenvalues_of(family.matrices(start))
     size = float(np.abs(eigenvalues - eigenvalues.mean()).max() or np.abs(eigenvalues).max()) or 1.0
-    groups: Sequence[Complex | None] | None = _choose_groups(eigenvalues, targets, family, rng)
-    state = groups and _measure(family, targets, start, groups, size)
+    groups: Sequence[Complex | None] = _choose_groups(eigenvalues, targets, family, rng)
+    state = _measure(family, targets, start, groups, size)
     while state and state.steps < _MAX_CLUSTER_STEPS:
         if state.largest_distance(targets) <= _CLOSE * size:
             break
@@ -184,7 +191,7 @@ def _gather(
             break
         assert trial is not None
         state = replace(trial, steps=state.steps + 1)
-    return state or None
+    return state
 
 
 def _measure(
@@ -202,7 +209,7 @@ def _measure(
         responses = [cluster.respond(change) for change in changes]
         rows = np.array([_stack(cluster.mean, cluster.power_sums, target), *(_stack(*r, target) for r in responses)])
         rows = (rows * scale).T
-        parts = rows.real if target.is_real(family) else np.concatenate([rows.real, rows.imag])
+        parts = rows.real if target.is_real(family.is_complex) else np.concatenate([rows.real, rows.imag])
         residual.append(parts[:, 0])
         jacobian.append(parts[:, 1:])
     return _Gathered(p, tuple(clusters), np.concatenate(residual), np.concatenate(jacobian))
@@ -216,8 +223,8 @@ def _stack(mean: complex, power_sums: Complex, target: Target) -> Complex:
 
 def _choose_groups(
     eigenvalues: Complex, targets: Sequence[Target], family: Family, rng: np.random.Generator | None
-) -> list[Complex] | None:
-    """The eigenvalues that shall coincide, one group for each target, without common ones; None if there are too few.
+) -> list[Complex | None]:
+    """The eigenvalues that shall coincide, one group for each target, without common ones; None where too few are left.
 
     The highest order chooses first. Without `rng` it takes the group with the least spread.
     """
@@ -226,10 +233,10 @@ def _choose_groups(
         target = targets[k]
         candidates = [g for z in left if (g := _nearest(left, z, target, family)) is not None]
         if not candidates:
-            return None
+            return [None]
         spreads = [np.abs(g - g.mean()).max() + abs(_stack(g.mean(), _NO_SUMS, target)[0]) for g in candidates]
-        groups[k] = candidates[int(np.argmin(spreads) if rng is None else rng.integers(len(candidates)))]
-        left = left[~np.isin(left, groups[k])]
+        group = candidates[int(np.argmin(spreads) if rng is None else rng.integers(len(candidates)))]
+        groups[k], left = group, left[~np.isin(left, group)]
     return [groups[k] for k in range(len(targets))]
 
 
@@ -241,7 +248,7 @@ def _nearest(eigenvalues: Complex, z: complex, target: Target, family: Family) -
     z = {"imaginary": 1j * z.imag, "zero": 0j}.get(target.axis, z)
     if family.is_complex:
         pool = eigenvalues
-    elif target.is_real(family):
+    elif target.is_real(family.is_complex):
         z, group = complex(z.real), list[complex]()
         for w in eigenvalues[np.argsort(np.abs(eigenvalues - z), kind="stable")]:
             both = [w] if w.imag == 0 else [w, w.conjugate()] if w.imag > 0 else []
@@ -273,38 +280,46 @@ def refine(
     p: Array,
     roots: Sequence[complex],
     nearest_to: Array | None = None,
-    steps_before: int = 0,
-) -> ExceptionalPoint | None:
+    steps: int = 0,
+) -> ExceptionalPoint:
     """Solve the equations of the chains by Gauss–Newton steps in the parameters and the eigenvalues.
 
     Args:
         nearest_to: a design. If the conditions leave freedom, the point nearest to it is found, in shares of the
             ranges; by default the one nearest to p.
+        steps: steps that led to p.
+
+    Raises:
+        LinAlgError: if the matrices are not finite, or an eigenvalue has several eigenvectors.
     """
     roots = [_project(s, target) for s, target in zip(roots, targets, strict=True)]
-    best, stalled = None, 0
     borders = [find_borders(family.matrices(p), s)[0] for s in roots]
-    for step_count in range(_MAX_CHAIN_STEPS):  # noqa: B007 - the number of steps is told
+    best, stalled_steps, step_count = None, 0, 0
+    while step_count < _MAX_CHAIN_STEPS and stalled_steps < _STALLED_STEPS:
         equations = _chain_equations(family, targets, p, roots, borders)
-        borders = [chain.borders for chain in equations.chains]
-        if best is None or equations.error < _PROGRESS * best.error:
-            stalled = 0
-        else:
-            stalled += 1
-        if best is None or equations.error <= best.error:
+        has_stalled = best is not None and not equations.error < max(_PROGRESS * best.error, _STILL)
+        stalled_steps = stalled_steps + 1 if has_stalled else 0
+        if best is None or equations.error <= max(best.error, _STILL):
             best = equations
-        pull = np.zeros(len(p)) if nearest_to is None else (nearest_to - p) / family.widths
+        borders = [chain.borders for chain in equations.chains]
+        pull = np.zeros(len(p)) if nearest_to is None else (nearest_to - p) / (family.widths + (family.widths == 0))
         step, moves = _chain_step(equations, targets, family, pull)
-        is_still = np.abs(step).max(initial=0.0) <= _STILL
-        if not np.isfinite(step).all() or stalled >= _STALLED_STEPS or (is_still and equations.error <= _STILL):
+        if not np.isfinite([*step, *moves]).all() or (step_count and max(np.abs([*step, *moves])) <= _STILL):
             break
         p = p + np.clip(step, -_MAX_STEP, _MAX_STEP) * family.widths
         roots = [s + move for s, move in zip(roots, moves, strict=True)]
+        step_count += 1
     assert best is not None
-    seconds = [
-        find_borders(family.matrices(best.p), c.s)[2] / size_at(family.matrices(best.p), c.s) for c in best.chains
-    ]
-    return ExceptionalPoint(best.p, best.chains, best.error, min(seconds), (steps_before, step_count))
+    p = np.where(np.abs(best.p) <= _STILL * family.widths, 0.0, best.p)
+    matrices = family.matrices(p)
+    seconds = [find_borders(matrices, c.s)[2] / size_at(matrices, c.s) for c in best.chains]
+    return ExceptionalPoint(p, best.chains, best.error, min(seconds), (steps, step_count))
+
+
+def measure_point(family: Family, targets: Sequence[Target], p: Array) -> ExceptionalPoint | None:
+    """The chains at a design that stays as it is; None if the matrices are not finite or an eigenvalue has several
+    eigenvectors."""
+    return find_point(family.at(p), targets, np.empty(0))
 
 
 @dataclass(frozen=True)
@@ -334,7 +349,7 @@ def _chain_equations(
         columns = [chain.residuals, *(chain.respond(change) for change in slopes)]
         columns += [chain.slopes * direction for direction in target.directions]
         table = np.array(columns).T / size
-        parts = table.real if target.is_real(family) else np.concatenate([table.real, table.imag])
+        parts = table.real if target.is_real(family.is_complex) else np.concatenate([table.real, table.imag])
         residual.append(parts[:, 0])
         rows.append(parts[:, 1 : 1 + len(p)])
         root_rows.append(parts[:, 1 + len(p) :])
@@ -357,10 +372,10 @@ def _chain_step(
     """
     slopes = equations.slopes * family.widths
     basis = np.linalg.qr(equations.root_slopes, mode="complete")[0][:, equations.root_slopes.shape[1] :]
-    reduced, right = basis.T @ slopes, -basis.T @ equations.residual
-    has_freedom = len(right) < len(pull)
-    wanted = pull if has_freedom else np.zeros(len(pull))
-    step = wanted + np.linalg.lstsq(reduced, right - reduced @ wanted, rcond=_CUTOFF)[0]
+    U, values, V = np.linalg.svd(basis.T @ slopes)
+    rank = int(np.sum(values > _CUTOFF * max(values[0], 1e-300))) if values.size else 0
+    right = (U[:, :rank].T @ basis.T @ -equations.residual) / values[:rank]
+    step = V[:rank].T @ right + V[rank:].T @ (V[rank:] @ pull)
     rest = -equations.residual - slopes @ step
     moves = iter(np.linalg.lstsq(equations.root_slopes, rest, rcond=_CUTOFF)[0].tolist())
     return step, [sum((d * next(moves) for d in target.directions), 0j) for target in targets]

@@ -25,6 +25,7 @@ from tmsopt.documents.design_rows import convert_to_si, format_multiplicity, tab
 from tmsopt.documents.solution import write_bicycle, write_growth_picture
 from tmsopt.documents.tables import write_question
 from tmsopt.global_search import Completeness
+from tmsopt.global_search.chain_equations import has_chain_proof
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem import unit_at
 from tmsopt.problem.problem import Posed
@@ -137,6 +138,8 @@ def _describe_method(problem: Posed, proof: Proof) -> Parts:
         has_constraints = len(proof.unknowns) + len(proof.moved) > problem.model.degree
         equations = "a_k = a0 c_k" + (" and the == constraints" if has_constraints else "")
         equations += ", where c_k are the coefficients of the pattern"
+        if has_chain_proof(problem, proof.pattern):
+            equations = "of the Jordan chain"
         yield Sentence(f"Krawczyk's interval Newton test on the equations {equations}", "method")
         error, distance = round_one_way(proof.radius, True, 2), round_one_way(proof.uniqueness, False, 2)
         uniqueness = f"every other such design differs in some number by more than {distance:.2g}"
@@ -188,6 +191,8 @@ def write_every(result: Every, _level: Level) -> Parts:
     verdict = Badge("proved to be all", "good") if is_complete else "not proved to be all"
     yield count_things(solutions, "design"), verdict
     effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
+    if proof and proof.total is not None:
+        effort = f"the discriminant has {proof.total} zeros, each one proved, {proof.seconds:.2g} s"
     if not solutions:
         no_design = f"no design within the ranges and limits has the pattern (proved; {effort})"
         yield Sentence(no_design if is_complete else "no isolated solution was found", tone="answer")

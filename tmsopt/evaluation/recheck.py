@@ -12,7 +12,7 @@ from tmsopt.algebra.formula import Formula, UnsupportedOperation, formula, symbo
 from tmsopt.algebra.intervals import ranges
 from tmsopt.algebra.kinds import gradients
 from tmsopt.boundaries.nearest import Robustness, find_stability_margins
-from tmsopt.chains.meetings import is_crossing
+from tmsopt.chains.meetings import is_crossing, mismatch
 from tmsopt.models import Model, Values
 from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import public_names
@@ -79,11 +79,15 @@ def recheck(
         # a singular mass matrix, or undefined coefficients
         violations["a0" if are_finite else "coefficients"] = 1.0
     if problem.pattern is not None:
-        a = [float(c) for c in nominal.coefficients]
-        distance = pattern_distance(problem.pattern, a, nominal.roundings(), _PATTERN_TOLERANCE)
-        crosses = distance <= _PATTERN_TOLERANCE and is_crossing(problem, problem.pattern, parameters)
+        if problem.model.statement is not None and problem.model.pencil is not None:
+            distance = mismatch(problem, problem.pattern, parameters)
+            crosses = not distance <= _PATTERN_TOLERANCE and is_crossing(problem, problem.pattern, parameters)
+        else:
+            a = [float(c) for c in nominal.coefficients]
+            distance = pattern_distance(problem.pattern, a, nominal.roundings(), _PATTERN_TOLERANCE)
+            crosses = distance <= _PATTERN_TOLERANCE and is_crossing(problem, problem.pattern, parameters)
         if crosses or not distance <= _PATTERN_TOLERANCE:
-            violations[problem.pattern.name] = 1.0 if crosses else distance
+            violations[problem.pattern.name] = min(1.0, distance)
     parameter_set = problem.parameter_set
     names = [
         n

@@ -79,6 +79,7 @@ class Completeness:
         seconds: time used.
         undecided: the undecided parts of the box.
         stopped: whether Ctrl-C ended the proof.
+        total: number of designs in the whole plane, if the discriminant tells it; else None.
     """
 
     complete: bool
@@ -89,6 +90,7 @@ class Completeness:
     seconds: float = 0.0
     undecided: tuple[Undecided, ...] = ()
     stopped: bool = False
+    total: int | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from tmsopt.errors import Fault
 from tmsopt.problem.problem import Posed
+from tmsopt.problem.symmetry import count_by_symmetry
 
 
 def find_objective_faults(problem: Posed) -> list[Fault]:
@@ -27,16 +28,23 @@ class Freedom:
 
     Attributes:
         free: free parameters.
-        conditions: codimension of the pattern plus the equality constraints.
+        conditions: conditions of the pattern that do not hold by symmetry, and equality constraints.
+        by_symmetry: further conditions of the pattern that hold for all parameters.
     """
 
     free: int
     conditions: int
+    by_symmetry: int = 0
 
     @property
     def count(self) -> int:
         """Degrees of freedom; negative if there are more conditions than parameters."""
         return self.free - self.conditions
+
+    @property
+    def of_equations(self) -> int:
+        """The same for equations that do not use the symmetry."""
+        return self.count - self.by_symmetry
 
     @property
     def kind(self) -> str:
@@ -46,5 +54,6 @@ class Freedom:
 
 def degrees_of_freedom(problem: Posed) -> Freedom:
     """Count free parameters, pattern conditions and equality constraints of a problem."""
-    equalities = sum(c.equality for c in problem.conditions.values())
-    return Freedom(len(problem.free), (problem.pattern.codimension if problem.pattern else 0) + equalities)
+    equalities, by_symmetry = sum(c.equality for c in problem.conditions.values()), count_by_symmetry(problem)
+    codimension = problem.pattern.codimension if problem.pattern else 0
+    return Freedom(len(problem.free), codimension - by_symmetry + equalities, by_symmetry)

@@ -211,6 +211,12 @@ class Solution(Printable):
         return eigenfrequencies(self.problem.model, self.roots)
 
     @property
+    def conditions(self) -> dict[str, int]:
+        """The conditions of the located pattern on the parameters, and how many of them hold by symmetry."""
+        pattern = self.problem.posed.pattern
+        return {"real": pattern.codimension if pattern else 0, "by_symmetry": self.freedom.by_symmetry}
+
+    @property
     def inertia_margin(self) -> Table[float | None] | None:
         """`models.inertia_margin` of a stable point-mass design in SI at its nominal values; else None."""
         in_si = self.problem.model.name == "tms" and self.problem.posed.parameter_set.rate is not None
@@ -272,6 +278,7 @@ class Solution(Printable):
             "seconds": round(self.seconds, 4),
             **plain(self, "quantities dimensionless formulation"),
             "freedom": plain(self.freedom, "free conditions count kind"),
+            **({"conditions": self.conditions} if problem.pattern and problem.model.pencil else {}),
             **plain(self, "branches notes"),
             **{name: value for name, value in optional.items() if value},
             **(plain(self, "inertia_margin") if problem.model.omits and problem.parameter_set.rate else {}),

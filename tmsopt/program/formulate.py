@@ -117,7 +117,7 @@ def formulate_matching(problem: Posed, pattern: Pattern | None = None, cases: Se
     build = Builder(problem, cases)
     build.add_pattern(pattern)
     build.add_constraints()
-    freedom = degrees_of_freedom(problem).count
+    freedom = degrees_of_freedom(problem).of_equations
     if problem.objective is not None and freedom >= 0:
         build.add_objective()
     elif freedom > 0:
@@ -286,7 +286,7 @@ class Builder:
         if pattern.abscissa is not None and self.covered_cases == [0]:
             self.quantities["abscissa"] = self.scale.unit * pattern.abscissa(unknowns)
         pattern_coefficients = [self.a[0] * c for c in pattern.monic(unknowns)]
-        if degrees_of_freedom(self.problem).count >= 0:
+        if degrees_of_freedom(self.problem).of_equations >= 0:
             self.add_equations(pattern.name, self.a, pattern_coefficients)
         else:
             self.objective = sum((a - b) ** 2 for a, b in zip(self.a, pattern_coefficients, strict=True))

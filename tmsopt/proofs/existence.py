@@ -11,6 +11,7 @@ import flint
 
 from tmsopt.algebra.balls import GUARD_DIGITS, largest_radius, upper_bound
 from tmsopt.algebra.krawczyk import Enclosure, ProofFailed, enclose_solution, refine_solution
+from tmsopt.global_search.chain_equations import ChainEquations, build_chain_equations, has_chain_proof
 from tmsopt.models.exact import ExactDesign
 from tmsopt.problem.problem import Posed
 from tmsopt.program.nlp import Scale
@@ -21,6 +22,8 @@ from tmsopt.roots.patterns.structure import fit_unknowns
 
 EXACT = "exact factorisation"
 """The method for a design whose coefficients are fractions."""
+
+AnyEquations = Equations | ChainEquations
 
 _EXTRA_DIGITS = 25  # decimal digits of the arithmetic beyond the requested ones
 _MAX_ATTEMPTS = 3  # each attempt computes with twice the digits of the previous one
@@ -42,6 +45,7 @@ class ProvedDesign:
         distance: how far the stored value of a parameter is from the proved one, for the parameter with the largest
             ratio of this distance to the distance that rounding explains.
         explained: the distance that rounding explains for this parameter.
+        has_chains: whether Jordan chains are proved, so that each multiple root of the pattern has one eigenvector.
     """
 
     method: str
@@ -55,6 +59,7 @@ class ProvedDesign:
     radius: float = 0.0
     distance: float = 0.0
     explained: float = 0.0
+    has_chains: bool = False
 
 
 def prove_exactly(problem: Posed, pattern: Pattern, design: ExactDesign) -> ProvedDesign | None:
@@ -89,7 +94,8 @@ def prove_nearby(
     Raises:
         ProofFailed: if the proof fails; the message gives the reason.
     """
-    system, working_digits = build_equations(problem, pattern, stored_values), digits + _EXTRA_DIGITS
+    build = build_chain_equations if has_chain_proof(problem, pattern.name) else build_equations
+    system, working_digits = build(problem, pattern, stored_values), digits + _EXTRA_DIGITS
     for _ in range(_MAX_ATTEMPTS):
         with flint.ctx.workdps(working_digits):
             proved_design = _search_nearby(system, design, stored_values, working_digits - _EXTRA_DIGITS // 2)
@@ -102,7 +108,7 @@ def prove_nearby(
 
 
 def _search_nearby(
-    system: Equations, design: ExactDesign, stored_values: Mapping[str, float], digits: int
+    system: AnyEquations, design: ExactDesign, stored_values: Mapping[str, float], digits: int
 ) -> ProvedDesign:
     """Try each choice of parameters to move and each start of the unknowns; the first proof counts."""
     problem, pattern = system.problem, system.pattern
@@ -112,7 +118,8 @@ def _search_nearby(
     ]
     reasons: list[str] = []
     for candidates in _parameter_choices(problem, stored_values, free_names, system.condition_count):
-        for unknowns in _start_values(system, exact_values):
+        starts = system.start_values() if isinstance(system, ChainEquations) else _start_values(system, exact_values)
+        for unknowns in starts:
             start = {**exact_values, **unknowns}
             try:
                 return _prove_from(system, start, candidates, digits)
@@ -157,7 +164,7 @@ def _start_values(system: Equations, exact_values: Mapping[str, Any]) -> Iterato
         yield lifted | {n: flint.arb(x * u) for n, x, u in zip(system.pattern_unknowns, fit, units, strict=True)}
 
 
-def _prove_from(system: Equations, start: Mapping[str, Any], candidates: list[str], digits: int) -> ProvedDesign:
+def _prove_from(system: AnyEquations, start: Mapping[str, Any], candidates: list[str], digits: int) -> ProvedDesign:
     """Prove a design from start values of all parameters and unknowns."""
     parameter_set = system.problem.parameter_set
     choice = choose_moved(system, start, candidates)
@@ -169,21 +176,49 @@ def _prove_from(system: Equations, start: Mapping[str, Any], candidates: list[st
     tangents = {n: solution[n] for n in parameter_set.names if parameter_set[n].tangent}
     parameters = {n: solution[n].atan() if n in tangents else solution[n] for n in parameter_set.names}
     coefficients = system.problem.model.coefficients(parameters, parameter_set)
-    unknowns = [solution[n] for n in system.pattern_unknowns]
-    _check_solution(system, coefficients, solution)
+    if isinstance(system, ChainEquations):
+        system.check(solution)
+        factorisation = _factorise(system, coefficients, solution)
+    else:
+        _check_solution(system, coefficients, solution)
+        factorisation = factor_pattern(system.pattern, [solution[n] for n in system.pattern_unknowns])
     return ProvedDesign(
         "Krawczyk",
         coefficients,
         parameters,
         tangents,
-        {n: solution[n] for n in system.unknowns},
-        factor_pattern(system.pattern, unknowns),
+        {} if isinstance(system, ChainEquations) else {n: solution[n] for n in system.unknowns},
+        factorisation,
         choice.moved,
         enclosure.uniqueness * min((system.units.get(n, 1.0) for n in names), default=1.0),
         largest_radius([solution[n] for n in names]),
         distance,
         explained,
+        isinstance(system, ChainEquations),
     )
+
+
+def _factorise(system: ChainEquations, coefficients: Sequence[Any], solution: Mapping[str, Any]) -> Factorisation:
+    """The polynomial of a model as a product of the multiple factors and the other roots' factor."""
+    rest = [c / coefficients[0] for c in coefficients]
+    factors = list[tuple[list[Any], int]]()
+    for s, target in zip(system.eigenvalues(solution), system.targets, strict=True):
+        square = s.real**2 + (s.imag - system.problem.model.carrier) ** 2
+        is_real = target.is_real(system.problem.model.is_complex)
+        factor = [flint.arb(1), -s.real] if is_real else [flint.arb(1), -2 * s.real, square]
+        factors.append((factor, target.order))
+        for _ in range(target.order):
+            rest = _divide(rest, factor)
+    return Factorisation((*factors, *([(rest, 1)] if len(rest) > 1 else [])))
+
+
+def _divide(coefficients: Sequence[Any], factor: Sequence[Any]) -> list[Any]:
+    """The quotient of two monic polynomials, without the remainder."""
+    rest, count = list(coefficients), len(coefficients) - len(factor) + 1
+    for i in range(count):
+        for j, x in enumerate(factor[1:], start=1):
+            rest[i + j] -= rest[i] * x
+    return rest[:count]
 
 
 def _measure_distance(

@@ -105,7 +105,7 @@ class MovedParameters:
     explained: Mapping[str, float]
 
 
-def choose_moved(system: Equations, point: Mapping[str, Any], candidates: Sequence[str]) -> MovedParameters:
+def choose_moved(system: Any, point: Mapping[str, Any], candidates: Sequence[str]) -> MovedParameters:
     """Choose the free parameters that the equations determine best, by QR with column pivoting without the unknowns.
 
     Raises:

@@ -9,8 +9,9 @@ Bifurcations of Dynamical Equilibria, SIAM 2000, chapter 3).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from math import comb
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -28,9 +29,10 @@ def expand(matrices: Any, s: Any, count: int) -> list[Any]:
         matrices: Pₖ in descending powers, of numbers of any kind.
     """
     d = len(matrices) - 1
-    return [
-        sum(comb(d - k, j) * s ** (d - k - j) * matrices[k] for k in range(d - j + 1)) for j in range(min(d + 1, count))
-    ]
+    terms = (
+        [comb(d - k, j) * s ** (d - k - j) * matrices[k] for k in range(d - j + 1)] for j in range(min(d + 1, count))
+    )
+    return [reduce(add, parts) for parts in terms]
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from tmsopt.program.options import documents_options
 from tmsopt.program.starts import complete_starts, sample_box
 from tmsopt.progress import begin
 from tmsopt.records import Array, Table, Tabular, plain
+from tmsopt.search.all_points import prove_all_points
 from tmsopt.search.local_search import solve_from
 from tmsopt.search.newton import build_square_system, estimate_error, find_zero, make_zero
 from tmsopt.search.solve import solve_any_status
@@ -147,7 +148,9 @@ def solve_all(problem: ProblemSource, *, seconds: float = SECONDS, **options: Un
     nlp = _build_equations(problem)
     state = SearchState(problem, problem, nlp, make_options(options, defaults=_DEFAULTS))
     begin(state.options.progress, "proving that no design is missed", "s")
-    proof = prove_completeness(problem, seconds, state.options.progress) if seconds > 0 else None
+    proof = prove_all_points(problem) if seconds > 0 else None
+    if proof is None and seconds > 0:
+        proof = prove_completeness(problem, seconds, state.options.progress)
     proved_entries = list[_IsolatedDesign]()
     for intervals in proof.designs if proof else ():
         errors = {n: float(x.radius) for n, x in intervals.items()} | {"abscissa": 0.0}

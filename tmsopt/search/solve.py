@@ -34,6 +34,7 @@ from tmsopt.program import DEFAULTS, Options, SolveOptions, make_options, object
 from tmsopt.program.options import documents_options
 from tmsopt.progress import Listener, begin, steps_for
 from tmsopt.records import Table
+from tmsopt.search.locate import has_chains, locate_by_chains
 from tmsopt.search.outcome import UNCLEAR, Outcome, assess_design, choose_outcome, write_mass_advice
 from tmsopt.search.policy import Policy, check_policy
 from tmsopt.search.remedies.infeasible import explain_infeasible
@@ -121,6 +122,12 @@ def solve_any_status(
         _check_near(problem, options.near)
         near = {n: min(max(options.near[n], lo), hi) for n, (lo, hi) in problem.free.items() if n in options.near}
         options = replace(options, near=near)
+    if (
+        has_chains(problem)
+        and policy.local is POLICY.local
+        and (outcome := locate_by_chains(problem, options, extra_starts))
+    ):
+        return _assemble(problem, outcome, sense_notes(problem), {}, began, with_bound)
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
     states = [
         s for s in begin_search(problem, options, tuple(extra_starts), policy.tuning) if s.side not in skipped_parts

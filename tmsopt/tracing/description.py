@@ -112,13 +112,13 @@ def _compute_eigenfrequency(points: Points) -> dict[str, Array] | None:
 
     The carrier is a real constant that is added to all eigenfrequencies, so ω is i s minus the carrier.
     """
-    carrier, pattern = points.setup.problem.model.carrier, points.setup.pattern
-    if carrier is None:
+    model, pattern = points.setup.problem.model, points.setup.pattern
+    if not model.is_complex:
         return None
     if not pattern.form.startswith("CEP") or pattern.unknowns[:2] != ("b", "c"):
         return {}
     b, c = points.unknowns[:2]
-    return {"omega_re": np.sqrt(c - b * b / 4) - carrier, "omega_im": -b / 2}
+    return {"omega_re": np.sqrt(c - b * b / 4) - model.carrier, "omega_im": -b / 2}
 
 
 def _group_events(located_events: Sequence[LocatedEvent], free_count: int) -> list[list[LocatedEvent]]:

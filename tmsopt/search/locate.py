@@ -1,0 +1,135 @@
+"""Locate a pattern in a system of matrices by its Jordan chains, from many starts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, islice
+
+import numpy as np
+
+from tmsopt.chains import ExceptionalPoint, Family, Target, family_of, find_point, measure_point, targets_of
+from tmsopt.evaluation.recheck import recheck
+from tmsopt.problem import Posed, Starts, degrees_of_freedom
+from tmsopt.problem.solution import OtherBranch
+from tmsopt.program import Options
+from tmsopt.program.formulate import default_start
+from tmsopt.program.starts import sample_box
+from tmsopt.progress import begin
+from tmsopt.records import Array, Table
+from tmsopt.search.outcome import Outcome
+
+_MIN_STARTS = 12  # starts that look for other solutions
+_SAME_POINT = 1e-7  # relative to each range: points that differ less are one solution
+_ROUNDINGS = 8  # units in the last place by which a parameter may change to become a short decimal
+_ZERO = 2.0**-52
+_MAX_OVERSHOOT = 1e-9  # relative to a range: a point this far outside it still counts as inside
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A solution of the pattern's equations.
+
+    Attributes:
+        violated: names of the limits that it violates.
+    """
+
+    point: ExceptionalPoint
+    parameters: Mapping[str, float]
+    violated: tuple[str, ...]
+    hits: int = 1
+
+
+def has_chains(problem: Posed) -> bool:
+    """Whether a problem asks for a pattern of a system of the user's matrices, and for nothing else but limits."""
+    is_stated = problem.model.statement is not None and problem.model.pencil is not None
+    equalities = any(condition.equality for condition in problem.conditions.values())
+    return bool(
+        is_stated and problem.locate and problem.free and not (problem.objective or problem.cases or equalities)
+    )
+
+
+def locate_by_chains(
+    problem: Posed, options: Options, extra_starts: Sequence[Mapping[str, float]] = ()
+) -> Outcome | None:
+    """The solution nearest to the start that meets all limits; None if none is found.
+
+    If the conditions leave freedom and a limit is active at the nearest solution, the result is None, too.
+    """
+    assert problem.pattern is not None
+    family, targets = family_of(problem), targets_of(problem.pattern.name, problem.model.is_complex)
+    first, rng = (
+        _vector(problem, {**default_start(problem), **(options.near or {})}),
+        np.random.default_rng(options.seed),
+    )
+    further = (
+        {**default_start(problem), **design}
+        for design in (*extra_starts, *islice(sample_box(problem, options.seed), options.starts))
+    )
+    begin(options.progress, "searching", "start")
+    found, start_count = list[_Found](), 0
+    for start in chain([first], (_vector(problem, design) for design in further)):
+        choice = rng if start_count % 2 else None  # every second start chooses freely which eigenvalues shall meet
+        point = find_point(family, targets, start, choice)
+        start_count += 1
+        if point is not None and point.is_found:
+            found = _add(problem, family, found, _shorten(family, targets, point))
+        if options.progress:
+            options.progress(start_count, options.starts)
+        if start_count >= options.starts or (
+            start_count >= min(_MIN_STARTS, options.starts) and any(not f.violated for f in found)
+        ):
+            break
+    feasible = sorted(
+        (f for f in found if not f.violated), key=lambda f: float(np.linalg.norm((f.point.p - first) / family.widths))
+    )
+    if not feasible:
+        return None
+    best, others = feasible[0], [f for f in found if f is not feasible[0]]
+    is_square = degrees_of_freedom(problem).count <= 0
+    checked = recheck(problem, best.parameters)
+    if checked.violations:
+        return None
+    return Outcome(
+        parameters=best.parameters,
+        checked=checked,
+        status="optimal",
+        active_gains={},
+        starts=Starts(start_count, sum(f.hits for f in found), best.hits, optima=len(found), runs=start_count),
+        formulation="chains",
+        branches=tuple(
+            OtherBranch(Table(f.parameters), f.violated) for f in sorted(others, key=lambda f: len(f.violated))
+        )
+        if is_square
+        else (),
+    )
+
+
+def _shorten(family: Family, targets: Sequence[Target], point: ExceptionalPoint) -> ExceptionalPoint:
+    """The point with decimals of 12 digits, if these satisfy the equations as well as its doubles do."""
+    p = np.array([float(f"{x:.12g}") for x in point.p])
+    if np.all(np.abs(p - point.p) <= _ROUNDINGS * np.spacing(np.abs(point.p)) + _ZERO * family.widths):
+        short = measure_point(family, targets, p)
+        if short is not None and short.is_found and short.backward_error <= point.backward_error + _ZERO:
+            return replace(short, p=p)
+    return point
+
+
+def _vector(problem: Posed, design: Mapping[str, float]) -> Array:
+    return np.array([design[n] for n in problem.free])
+
+
+def _add(problem: Posed, family: Family, found: list[_Found], point: ExceptionalPoint) -> list[_Found]:
+    """The solutions with one more, unless it is known already."""
+    for k, known in enumerate(found):
+        if np.all(np.abs(known.point.p - point.p) <= _SAME_POINT * family.widths):
+            return [*found[:k], replace(known, hits=known.hits + 1), *found[k + 1 :]]
+    excess = np.maximum(family.box[:, 0] - point.p, point.p - family.box[:, 1]) / family.widths
+    names = [
+        f"{n}.{'min' if x < low else 'max'}"
+        for n, x, (low, _), e in zip(problem.free, point.p, family.box, excess, strict=True)
+        if e > _MAX_OVERSHOOT
+    ]
+    p = point.p if names else np.clip(point.p, *family.box.T)
+    parameters = problem.ordered(dict(zip(problem.free, p.tolist(), strict=True)))
+    values = problem.values(parameters)
+    names += [n for n, condition in problem.conditions.items() if not condition.violation(values) <= 0]
+    return [*found, _Found(replace(point, p=p), parameters, tuple(names))]
