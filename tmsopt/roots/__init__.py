@@ -5,6 +5,7 @@ first. `patterns` finds out which roots coincide, and `quartics` solves millions
 """
 
 from tmsopt.roots.batch import classify, find_motion
+from tmsopt.roots.chains import make_cluster
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.jordan import exact_longest, exact_nullity, has_one_eigenvector, is_regular, jordan
@@ -15,6 +16,7 @@ from tmsopt.roots.patterns.structure import Structure, multiple_real_roots, patt
 from tmsopt.roots.polynomial import Root, determinant, evaluate, product, quadratic_pencil, shift
 from tmsopt.roots.quartics.classes import CLASSES, Classes, quartic_classes, quartic_is_stable
 from tmsopt.roots.quartics.quartic import Factors, Motion, abscissa_and_damping, quartic_factors
+from tmsopt.roots.spectrum import spectrum
 from tmsopt.roots.stability import discriminant, hurwitz_minors, is_stable, lienard_chipart, routh
 
 __all__ = [
@@ -45,6 +47,7 @@ __all__ = [
     "is_stable",
     "jordan",
     "lienard_chipart",
+    "make_cluster",
     "multiple_real_roots",
     "pattern",
     "pattern_distance",
@@ -58,5 +61,6 @@ __all__ = [
     "roots",
     "routh",
     "shift",
+    "spectrum",
     "structure",
 ]

@@ -32,7 +32,8 @@ def join_group_names(names: Iterable[str], groups: Iterable[Group]) -> str:
     """Join the names of multiple roots and the names of the simple pairs and real roots among the groups."""
     simple_are_real = [g.is_real for g in groups if g.multiplicity == 1]
     count = simple_are_real.count(False)
-    pairs = ["pair"] if count == 1 else [f"{NUMBER_WORDS[count]} pairs"] if count else []
+    number = NUMBER_WORDS[count] if count < len(NUMBER_WORDS) else count
+    pairs = ["pair"] if count == 1 else [f"{number} pairs"] if count else []
     return "+".join([*names, *pairs, *["real"] * simple_are_real.count(True)])
 
 

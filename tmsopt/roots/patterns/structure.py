@@ -197,10 +197,10 @@ def _make_structure(fit: Fit, numeric: Roots, unit: float) -> Structure:
     all_roots = ((w, m) for z, m in upper for w in ((z, z.conjugate()) if z.imag else (z,)))
     roots = [Root(float(w.real) if abs(w.real) > zero_size else 0.0, float(w.imag), m) for w, m in all_roots]
     is_two_double = [(root.im, root.multiplicity) for root in roots] == [(0.0, 2), (0.0, 2)]
-    return Structure("2EP2" if is_two_double else _name_line(line_groups), rightmost_first(roots), fit.distance)
+    return Structure("2EP2" if is_two_double else name_line(line_groups), rightmost_first(roots), fit.distance)
 
 
-def _name_line(line_groups: Sequence[Group]) -> str:
+def name_line(line_groups: Sequence[Group]) -> str:
     """Name of the roots and pairs on a vertical line."""
     multiple = sorted((g.multiplicity, g.is_real) for g in line_groups if g.multiplicity > 1)
     return join_group_names((f"EP{m}" if is_real else f"CEP{m}" for m, is_real in reversed(multiple)), line_groups)
