@@ -190,7 +190,10 @@ def coefficients_over(
         with flint.ctx.workdps(DIGITS):
             polynomials = fold(formula(values.values()), {name: flint.arb_poly([0, 1])}, BALLS)
             exact_values = {n: _to_fractions(x) for n, x in zip(values, polynomials, strict=True)}
-            a = [list(flint.fmpq_poly([0]) + c) or [flint.fmpq(0)] for c in problem.model.polynomial(**exact_values)]
+            a = [
+                list(flint.fmpq_poly([0]) + c) or [flint.fmpq(0)]
+                for c in problem.model.evaluate_polynomial(exact_values)
+            ]
     except (TypeError, AttributeError, ValueError, ArithmeticError, DomainError):  # not a polynomial
         a = []
     if not any(x != 0 for c in a for x in c):

@@ -131,7 +131,7 @@ def _bound_product(problem: Posed) -> float:
 @lru_cache(maxsize=64)
 def _trace_outer_coefficients(model: Model, names: tuple[str, ...]) -> Formula:
     """a0 and aₙ in the algebraic parameters."""
-    return trace(lambda x: model.polynomial(**x)[:: model.degree], names)
+    return trace(lambda x: model.evaluate_polynomial(x)[:: model.degree], names)
 
 
 def _enclose_product(problem: Posed) -> float:

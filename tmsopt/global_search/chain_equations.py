@@ -41,6 +41,7 @@ class ChainEquations:
         roots: these eigenvalues in doubles.
         borders: b and c of each target, as columns.
         units: name → its unit.
+        sizes: size of the terms of each F_j of each target, for their rounding.
         symmetry: the symmetry that reduces the equations.
         phases: with a real polynomial, the phase of −1/det B at each eigenvalue; else empty.
     """
@@ -51,6 +52,7 @@ class ChainEquations:
     roots: tuple[complex, ...]
     borders: tuple[tuple[Any, Any], ...]
     units: Mapping[str, float]
+    sizes: tuple[tuple[float, ...], ...] = ()
     symmetry: Symmetry = NONE
     phases: tuple[complex, ...] = ()
     equalities: tuple[Expression, ...] = ()
@@ -79,7 +81,7 @@ class ChainEquations:
         """Number of conditions on the parameters."""
         if self.symmetry == NONE:
             return sum(t.conditions(self.is_complex) for t in self.targets)
-        size = self.problem.model.degree // 2
+        size = self.problem.model.size
         return sum(self.symmetry.independent_conditions(t.order, size) for t in self.targets)
 
     def start_values(self) -> Iterator[dict[str, Any]]:
@@ -120,15 +122,11 @@ class ChainEquations:
 
     def _parts(self, target: int, values: Sequence[Any]) -> list[Any]:
         """The real equations of complex values F₀ … F₍ₖ₋₁₎ of one target."""
-        order = self.targets[target].order
-        # About 0, every second value is 0 if the eigenvalues are symmetric.
-        used = [*enumerate(values)][order % 2 if self.targets[target].axis == "zero" and self.is_complex else 0 :]
-        if self.targets[target].axis == "zero" and self.is_complex:
-            used = used[::2]
+        used = [(j, values[j]) for j in self._used(target)]
         if self.phases:  # a distance t along the imaginary axis is i times a real number
             z = flint.acb(self.phases[target].real, -self.phases[target].imag)
             return [(z * flint.acb(0, 1) ** j * x).real for j, x in used]
-        imaginary = [] if self.targets[target].is_real(self.is_complex) else [x.imag for _, x in used]
+        imaginary = [] if self._has_real_equations(target) else [x.imag for _, x in used]
         return [*(x.real for _, x in used), *imaginary]
 
     def check(self, point: Mapping[str, Any]) -> None:
@@ -140,6 +138,23 @@ class ChainEquations:
         for phase, one in zip(self.phases, self._series(self._matrices(point), point), strict=False):
             if (flint.acb(phase.real, -phase.imag) / one.determinant).real.contains(0):
                 raise ProofFailed("the symmetry does not reduce the equations there: a phase may vanish")
+
+    def term_sizes(self) -> list[float]:
+        """Size of the terms of each equation; a stored design may miss the equation by a rounding of it."""
+        return [
+            sizes[j]
+            for k, sizes in enumerate(self.sizes)
+            for _ in range(1 if self._has_real_equations(k) else 2)
+            for j in self._used(k)
+        ]
+
+    def _has_real_equations(self, target: int) -> bool:
+        return bool(self.phases) or self.targets[target].is_real(self.is_complex)
+
+    def _used(self, target: int) -> range:
+        """The j of the F_j that are not 0 by symmetry: about 0, every second one if the eigenvalues are symmetric."""
+        order, is_centred = self.targets[target].order, self.targets[target].axis == "zero" and self.is_complex
+        return range(order % 2, order, 2) if is_centred else range(order)
 
     def jacobian(self, point: Mapping[str, Any], names: Sequence[str]) -> Any:
         """Derivatives of the left sides, with one column for each of `names`."""
@@ -221,13 +236,14 @@ def build_chain_equations(problem: Posed, pattern: Pattern, parameters: Numbers)
         roots = tuple(
             s - _mean_eigenvalue(chain, model.is_complex) for s, chain in zip(roots, point.chains, strict=True)
         )
-        is_centred = symmetry.is_chiral and targets[0].order == model.degree // 2
+        is_centred = symmetry.is_chiral and targets[0].order == model.size
         targets = tuple(replace(t, axis="zero" if is_centred else "imaginary") for t in targets)
         if symmetry.is_real:
             ends = (1j**chain.order * chain.values[-1] for chain in point.chains)
             phases = tuple(complex(z / abs(z)) for z in ends)
+    sizes = tuple(chain.term_sizes(family.matrices(point.p)) for chain in point.chains)
     unit = unit_near(scale_of(problem).unit)
-    system = ChainEquations(problem, pattern, targets, roots, borders, proof_units(problem), symmetry, phases)
+    system = ChainEquations(problem, pattern, targets, roots, borders, proof_units(problem), sizes, symmetry, phases)
     return replace(system, units={**system.units, **dict.fromkeys(system.unknowns, unit)})
 
 

@@ -45,12 +45,12 @@ def inertia_margin(parameters: Numbers) -> Table[float | None] | None:
     with flint.ctx.workprec(_BITS):
         si_values = {p.name: flint.arb(float(parameters.get(p.name, p.default or 0.0))) for p in si.parameters}
         points = {name: rational(x) for name, x in model.algebraic(si.native(si_values)).items()}
-        coefficients = model.polynomial(**points)
+        coefficients = model.evaluate_polynomial(points)
         sign = 1 if coefficients[0] > 0 else -1
         if not all(x > 0 for x in [sign * coefficients[0], *lienard_chipart([sign * c for c in coefficients])]):
             return None
         x = flint.fmpq_poly([0, 1])
-        return Table({name: _least_root(model.polynomial(**{**points, name: x})) for name in INERTIAS})
+        return Table({name: _least_root(model.evaluate_polynomial({**points, name: x})) for name in INERTIAS})
 
 
 def _least_root(coefficients: Sequence[Any]) -> float | None:

@@ -235,7 +235,8 @@ class Model:
     Attributes:
         sets: parameter sets; the first is the native one.
         algebraic: native parameters → algebraic parameters, in which the coefficients are polynomials.
-        polynomial: algebraic parameters → coefficients, descending, computed with ``+ - *`` only.
+        polynomial: algebraic parameters → coefficients, descending, computed with ``+ - *`` only; None for large
+            matrices, whose roots are computed without it.
         quantities: derived quantities, besides the coefficients ``a0 …``.
         compact: like `polynomial`, but the coefficients are divided by a positive number and computed in few
             operations with common terms, which gives tighter bounds in interval arithmetic.
@@ -252,6 +253,7 @@ class Model:
         conventions: texts about the signs.
         sketch: drawing as text.
         absent: unknown names that a user may try → what to write instead.
+        is_complex: whether the system is stated by a complex H.
         carrier: number added to each eigenfrequency of a complex H; 0 for a real system. The real polynomial of H
             has twice the degree. Because of the carrier, none of its roots coincides with the conjugate of another.
         carried: for a complex H, ranges of the native parameters → the model with a carrier for these ranges.
@@ -269,7 +271,7 @@ class Model:
     degree: int
     sets: tuple[ParameterSet, ...]
     algebraic: Callable[[AnyNumbers], dict[str, Any]]
-    polynomial: Callable[..., list[Any]]
+    polynomial: Callable[..., list[Any]] | None
     quantities: tuple[Quantity, ...] = ()
     compact: Callable[..., list[Any]] | None = None
     pencil: Callable[[AnyNumbers], Matrices] | None = None
@@ -283,6 +285,7 @@ class Model:
     conventions: tuple[str, ...] = ()
     sketch: str = ""
     absent: Mapping[str, str] = Table()
+    is_complex: bool = False
     carrier: float = 0.0
     carried: Callable[[Mapping[str, tuple[float, float]]], "Model"] | None = None
 
@@ -294,6 +297,10 @@ class Model:
         origin = self.origin
         is_unchanged = origin and (origin[0] is not resolve_name or resolve_name(*origin[1]) is self)
         return origin if is_unchanged else super().__reduce_ex__(protocol)
+
+    def evaluate_polynomial(self, algebraic: AnyNumbers) -> list[Any]:
+        """The coefficients for algebraic parameters; none for large matrices."""
+        return self.polynomial(**algebraic) if self.polynomial else []
 
     def coefficients(self, parameters: AnyNumbers, of: ParameterSet | None = None) -> list[Any]:
         """Coefficients a0 … aₙ, descending, for numbers of any kind: floats, arrays, CasADi, balls."""
@@ -315,15 +322,20 @@ class Model:
         formulas = {}
         for parameter_set in self.sets:
             native = parameter_set.native({n: symbol(n) for n in parameter_set.names})
-            coefficients = self.polynomial(**self.algebraic(native))
+            coefficients = self.evaluate_polynomial(self.algebraic(native))
             outputs = [*(native[n] for n in self.sets[0].names), *coefficients]
             formulas[parameter_set.name] = formula(outputs, parameter_set.names)
         return formulas
 
     @property
-    def is_complex(self) -> bool:
-        """Whether the system is stated by a complex H."""
-        return self.carried is not None
+    def is_doubled(self) -> bool:
+        """Whether the polynomial is that of a real system of twice the size, for a complex H."""
+        return self.is_complex and self.polynomial is not None
+
+    @property
+    def size(self) -> int:
+        """Number of roots of the system as the user states it."""
+        return self.degree // 2 if self.is_doubled else self.degree
 
     def within(self, ranges: Mapping[str, tuple[float, float]]) -> "Model":
         """The model for parameters in given ranges: a complex H gets a carrier for them, other models stay the same."""
@@ -334,13 +346,15 @@ class Model:
         from tmsopt.models.typeset import LATEX, Typeset, polynomial_text
 
         native_set = self.sets[0]
+        if self.polynomial is None:
+            return None
         outputs = fold(self.formulas[native_set.name], {p.name: Typeset(p.latex) for p in native_set.parameters}, LATEX)
         text = polynomial_text(outputs[len(native_set.names) :])
         return f"$${text} = 0$$" if len(text) <= _MAX_LATEX else None
 
     def coefficient_names(self) -> tuple[str, ...]:
         """``a0 … an``, or ``coefficient0 …`` if a parameter or quantity has one of these names."""
-        return self._coefficient_names
+        return self._coefficient_names if self.polynomial else ()
 
     @cached_property
     def _coefficient_names(self) -> tuple[str, ...]:

@@ -34,47 +34,47 @@ def pattern_of(model: Model, name: str) -> Pattern:
     Raises:
         ValueError: if the name is unknown, or the pattern needs more roots than the model has.
     """
-    return pattern(name, model.degree) if not model.is_complex else complex_pattern(name, model.degree // 2)
+    return pattern(name, model.degree) if not model.is_complex else complex_pattern(name, model.size)
 
 
 def patterns_of(model: Model) -> tuple[str, ...]:
     """Names of the patterns of a model that are not composed of other patterns."""
-    return pattern_names(model.degree) if not model.is_complex else complex_pattern_names(model.degree // 2)
+    return pattern_names(model.degree) if not model.is_complex else complex_pattern_names(model.size)
 
 
 def full_patterns(model: Model) -> tuple[str, ...]:
     """Names of the patterns in which all roots coincide in one root or one pair; empty for one root."""
     if model.is_complex:
-        return (f"EP{model.degree // 2}",) if model.degree > 2 else ()
+        return (f"EP{model.size}",) if model.degree > 2 else ()
     pairs = (f"CEP{model.degree // 2}",) if model.degree > 2 and model.degree % 2 == 0 else ()
     return (f"EP{model.degree}", *pairs) if model.degree > 1 else ()
 
 
 def public_names(model: Model, parameter_set: ParameterSet) -> tuple[str, ...]:
     """`Model.quantity_names`, without the coefficients of a complex H, which depend on the carrier."""
-    hidden = () if not model.is_complex else model.coefficient_names()
+    hidden = model.coefficient_names() if model.is_complex else ()
     return tuple(n for n in model.quantity_names(parameter_set) if n not in hidden)
 
 
 def user_structure_name(model: Model, name: str) -> str:
     """The user's name of a pattern or structure of the polynomial."""
-    return name if not model.is_complex else complex_name(name)
+    return name if not model.is_doubled else complex_name(name)
 
 
 def user_roots(model: Model, roots: Iterable[Any]) -> tuple[Any, ...]:
     """The user's roots for roots of the polynomial: numbers or balls with ``re``, ``im`` and multiplicity."""
-    if not model.is_complex:
+    if not model.is_doubled:
         return tuple(roots)
     return tuple(replace(r, im=r.im + model.carrier) for r in roots if r.im < 0)
 
 
 def user_root_array(model: Model, roots: Any) -> Any:
     """The user's roots for a complex array with all roots along its last axis, in the order of their real parts."""
-    if not model.is_complex:
+    if not model.is_doubled:
         return roots
     import numpy as np
 
-    order = np.argsort(np.where(roots.imag < 0, 0, 1), axis=-1, kind="stable")[..., : model.degree // 2]
+    order = np.argsort(np.where(roots.imag < 0, 0, 1), axis=-1, kind="stable")[..., : model.size]
     return np.take_along_axis(roots, order, axis=-1) + 1j * model.carrier
 
 
@@ -85,7 +85,7 @@ def user_structure(model: Model, structure: Structure) -> Structure:
 
 def polynomial_structure(model: Model, name: str, roots: Sequence[Root]) -> Structure:
     """The structure of the polynomial for a user's name and roots; the inverse of `user_structure`."""
-    if not model.is_complex:
+    if not model.is_doubled:
         return Structure(name, tuple(roots), 0.0)
     lower = [replace(r, im=r.im - model.carrier) for r in roots]
     return Structure(real_form_name(name), tuple(w for r in lower for w in (replace(r, im=-r.im), r)), 0.0)
@@ -95,7 +95,7 @@ def describe_user_structure(model: Model, structure: str, has_gain: bool = False
     """A user's structure in words, which for a complex H depend on whether it has gain."""
     if not model.is_complex:
         return describe_structure(structure, model.degree)
-    return describe_complex_structure(structure, model.degree // 2, has_gain)
+    return describe_complex_structure(structure, model.size, has_gain)
 
 
 def eigenfrequencies(model: Model, roots: Iterable[Root]) -> tuple[Root, ...]:

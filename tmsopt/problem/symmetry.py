@@ -41,11 +41,14 @@ class Symmetry:
         is_real: whether the characteristic polynomial of H′ is real, or that of a real system a polynomial in s².
         is_chiral: whether the eigenvalues of H′ are symmetric about 0.
         has_loss: whether the mean eigenfrequency of H is complex.
+        is_hermitian: whether H′ is Hermitian, so that no eigenvalue ever lacks an eigenvector. It has no other
+            symmetry then.
     """
 
     is_real: bool = False
     is_chiral: bool = False
     has_loss: bool = False
+    is_hermitian: bool = False
 
     def independent_conditions(self, order: int, size: int) -> int:
         """Number of conditions for an eigenvalue of a multiplicity that do not hold for all parameters.
@@ -67,7 +70,7 @@ def count_by_symmetry(problem: Posed) -> int:
     parts, double = composition(pattern.name), "EP" if model.is_complex else "CEP"
     if any(kind != double for kind, _, _ in parts):
         return 0
-    symmetry, size = find_symmetry(problem), model.degree // 2
+    symmetry, size = find_symmetry(problem), model.size
     return sum(count * (2 * (k - 1) - symmetry.independent_conditions(k, size)) for _, k, count in parts)
 
 
@@ -88,6 +91,9 @@ def find_symmetry(problem: Posed) -> Symmetry:
     conjugate = [[Pair(x.re, -x.im) for x in row] for row in H]
     negative = [[-x for x in row] for row in H]
     samples = _sample(problem, H)
+    adjoint = [[conjugate[j][i] for j in range(n)] for i in range(n)]
+    if _holds(np.eye(n, dtype=complex), adjoint, H):
+        return Symmetry(is_hermitian=True)
     return Symmetry(
         is_real=any(_holds(S, conjugate, H) for S in _candidates(samples.conj(), samples)),
         is_chiral=any(_holds(S, H, negative) for S in _candidates(samples, -samples)),

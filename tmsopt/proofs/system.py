@@ -64,6 +64,10 @@ class Equations:
         """Number of conditions on the parameters."""
         return self.pattern.codimension + len(self.equalities)
 
+    def term_sizes(self) -> float:
+        """Size of the terms of an equation that the parameters do not show: none."""
+        return 0.0
+
     def __call__(self, point: Mapping[str, Any]) -> list[Any]:
         """Compute the left sides."""
         values = values_at(self.problem, self.lifted, point, {})
@@ -121,7 +125,7 @@ def choose_moved(system: Any, point: Mapping[str, Any], candidates: Sequence[str
     names = [*parameter_set.names, *system.unknowns]
     jacobian = np.array([[float(e) for e in row] for row in jacobian_of(system, point, names).tolist()])
     values = np.array([abs(float(point[n])) for n in names])
-    rounding = np.abs(jacobian) @ values + 1e-300
+    rounding = np.maximum(np.abs(jacobian) @ values, system.term_sizes()) + 1e-300
     widths = {n: _MIN_SCALE * (hi - lo) for n, (lo, hi) in system.problem.free.items()}
     units = [system.units.get(n, 1.0) for n in names]
     scale = np.maximum(np.where(values > 0, values, units), [widths.get(n, 0.0) for n in names])

@@ -98,6 +98,13 @@ class Chain:
                 total[j] -= np.trace(products[: j - i + 1, : j - i + 1][:, ::-1])
         return np.asarray(total * self.powers)
 
+    def term_sizes(self, matrices: Complex) -> tuple[float, ...]:
+        """Sizes of the sums whose values are F₀ … F₍ₖ₋₁₎: Σ |y_a| S |x_c| over a + c = j, for the sizes S of L(λ)."""
+        d = len(matrices) - 1
+        size = sum(abs(self.s) ** (d - k) * np.abs(P) for k, P in enumerate(matrices))
+        products = np.abs(self.left) @ size @ np.abs(self.right).T
+        return tuple(float(np.trace(products[: j + 1, : j + 1][:, ::-1])) for j in range(self.order))
+
     def backward_error(self, size: float) -> float:
         """Size of a change of the matrices, relative to `size`, after which λ has exactly this chain.
 

@@ -104,13 +104,13 @@ def locate_by_chains(
 
 
 def _shorten(family: Family, targets: Sequence[Target], point: ExceptionalPoint) -> ExceptionalPoint:
-    """The point with decimals of 12 digits, if these satisfy the equations as well as its doubles do."""
-    p = np.array([float(f"{x:.12g}") for x in point.p])
-    if np.all(np.abs(p - point.p) <= _ROUNDINGS * np.spacing(np.abs(point.p)) + _ZERO * family.widths):
-        short = measure_point(family, targets, p)
-        if short is not None and short.is_found and short.backward_error <= point.backward_error + _ZERO:
-            return replace(short, p=p)
-    return point
+    """The point, with parameters replaced by decimals of 12 digits where these satisfy the equations as well."""
+    short = np.array([float(f"{x:.12g}") for x in point.p])
+    is_near = np.abs(short - point.p) <= _ROUNDINGS * np.spacing(np.abs(point.p)) + _ZERO * family.widths
+    p = np.where(is_near, short, point.p)
+    measured = None if np.array_equal(p, point.p) else measure_point(family, targets, p)
+    is_as_good = measured is not None and measured.is_found and measured.backward_error <= point.backward_error + _ZERO
+    return replace(measured, p=p) if measured is not None and is_as_good else point
 
 
 def _vector(problem: Posed, design: Mapping[str, float]) -> Array:

@@ -29,6 +29,7 @@ from tmsopt.problem import (
 )
 from tmsopt.problem.dependence import sense_notes
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
+from tmsopt.problem.symmetry import find_symmetry
 from tmsopt.problem.verdict.stability import stability
 from tmsopt.program import DEFAULTS, Options, SolveOptions, make_options, objective_size
 from tmsopt.program.options import documents_options
@@ -145,6 +146,8 @@ def solve_any_status(
     sampled_count = sum(len(state.sample.box.draws) for state, _ in searched_parts if state.sample)
     outcome = replace(outcome, starts=replace(outcome.starts, looked=sampled_count))
     notes = (*_describe_sides(problem, searched_parts, outcome), *sense_notes(problem))
+    if problem.locate and "EP" in problem.locate and problem.model.is_complex and find_symmetry(problem).is_hermitian:
+        notes = (*notes, "H is Hermitian up to a multiple of 1 for all parameters, so it has no exceptional point")
     objective_by_side = {
         state.side: o.checked.objective if o and o.status == "optimal" else math.nan
         for state, o in searched_parts

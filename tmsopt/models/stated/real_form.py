@@ -71,6 +71,7 @@ def complex_model(
 
     model = replace(
         real_model,
+        is_complex=True,
         carrier=carrier,
         carried=choose_carrier,
         words=WORDS,

@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 from itertools import islice
@@ -34,15 +35,18 @@ from tmsopt.models.stated.closed_loop import LOOP_KEYS, check_loop, close_loop
 from tmsopt.models.stated.degree import first_fault
 from tmsopt.models.stated.equations import IMAGINARY_KEY, pencil, polynomial, sort_places, user_key
 from tmsopt.models.stated.pairs import Pair, complex_text, join
-from tmsopt.models.stated.real_form import complex_model, frequency_bounds
+from tmsopt.models.stated.real_form import ABSENT, CONVENTIONS, WORDS, complex_model, frequency_bounds
 from tmsopt.models.stated.texts import Unfit, describe_position, parse_entries
 from tmsopt.records import AnyNumbers
 
 _ACCEPTED_ENTRIES = "accepted: finite numbers, expressions in quotes, and SX expressions"
 _ACCEPTED_NUMBERS = "accepted: finite numbers, and expressions of them"
 
-_MAX_SIZE = dict.fromkeys("MDKH", 6) | dict.fromkeys(("A", "coefficients", *LOOP_KEYS), 12)
+_MAX_SIZE = dict.fromkeys("MDK", 50) | dict.fromkeys("AH", 100) | dict.fromkeys(("coefficients", *LOOP_KEYS), 12)
 """Key → largest number of rows and columns of a matrix; for coefficients, largest degree."""
+
+_MAX_POLYNOMIAL_SIZE = dict.fromkeys("MDKH", 6) | {"A": 12}
+"""Key → largest number of rows of a matrix whose characteristic polynomial is used."""
 
 _Shape = tuple[str, int, int]  # key, number of rows and number of columns of a matrix
 _SAMPLES = 24  # a coefficient that is 0 at so many designs is then tested exactly
@@ -243,37 +247,47 @@ def _build_from_data(
     entries = fold(entry_formula, {n: symbol(n) for n in names}, NODES)
     remaining_entries = iter(entries)
     blocks = close_loop(_split(remaining_entries, shapes))
-    all_coefficients = polynomial(kind, blocks, carrier)
-    degree = len(all_coefficients) - 1
-    zero_count = _leading_zeros(formula(all_coefficients, names))
-    zero_count = zero_count and _count_identical_zeros(kind, blocks, names, zero_count)
-    if zero_count == degree:
-        raise Unfit(shapes[0][0], "gives a polynomial without s, which has no root")
-    coefficients = formula(all_coefficients[zero_count:], names)
+    matrices = None if kind == "coefficients" else pencil(blocks)
+    coefficients, degree = None, (len(matrices) - 1) * len(matrices[0]) if matrices else 0
+    if matrices is None or len(matrices[0]) <= _MAX_POLYNOMIAL_SIZE[shapes[0][0]]:
+        coefficients = _find_polynomial(kind, shapes[0][0], blocks, names, carrier)
+        degree = len(coefficients.outputs) - 1
     quantities = zip(quantity_names, remaining_entries, strict=True)
     parameters = tuple(Parameter(n, "1", "parameter", latex(n)) for n in names)
     arguments = (kind, name, shapes, quantity_names, entry_formula)
     model = Model(
         name=name,
         title=name,
-        degree=degree - zero_count,
+        degree=degree,
         sets=(ParameterSet("stated", parameters, native=dict),),
         algebraic=dict,
-        polynomial=lambda **numbers: values(coefficients, numbers),
+        polynomial=None if coefficients is None else lambda **numbers: values(coefficients, numbers),
         quantities=tuple(Quantity(n, "1", "quantity", latex(n), _make_function(x, names)) for n, x in quantities),
-        pencil=None if kind == "coefficients" else _matrices(pencil(blocks), names),
+        pencil=None if matrices is None else _matrices(matrices, names),
         origin=(_build_from_data, (*arguments, carrier) if carrier else arguments),
         statement=_statement(entry_formula, shapes, quantity_names),
         numbers=tuple(number_text(x) for x in entry_formula.constants if getattr(x, "denominator", 0) != 1),
     )
     if kind != "hamiltonian":
         return model
+    if coefficients is None:
+        return replace(model, is_complex=True, words=WORDS, absent=ABSENT, conventions=CONVENTIONS)
     return complex_model(
         model,
         carrier,
         frequency_bounds(entries[: len(entries) - len(quantity_names)]),
         lambda c: _build_from_data(*arguments, *([c] if c else [])),
     )
+
+
+def _find_polynomial(kind: str, key: str, blocks: dict[str, Matrix], names: Sequence[str], carrier: float) -> Formula:
+    """The coefficients of the characteristic polynomial, without leading ones that are 0 for all parameters."""
+    all_coefficients = polynomial(kind, blocks, carrier)
+    zero_count = _leading_zeros(formula(all_coefficients, names))
+    zero_count = zero_count and _count_identical_zeros(kind, blocks, names, zero_count)
+    if zero_count == len(all_coefficients) - 1:
+        raise Unfit(key, "gives a polynomial without s, which has no root")
+    return formula(all_coefficients[zero_count:], names)
 
 
 def _make_function(x: Any, names: Sequence[str]) -> Callable[[AnyNumbers], Any]:
