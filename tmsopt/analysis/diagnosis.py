@@ -122,6 +122,8 @@ def diagnose_roots(
         free: ranges of free parameters. A value that is tiny compared with its range may be a rounded 0.
     """
     range_widths, diagnoses = {n: b - a for n, (a, b) in (free or {}).items()}, []
+    if model.polynomial is None:
+        return ()
 
     def find_chains(point: RootPoint) -> Jordan | None:
         """The Jordan chains, by ranks of the matrices; None without matrices, or if they are singular for every s."""

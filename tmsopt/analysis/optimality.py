@@ -186,6 +186,8 @@ def _choose_problem(solution: Solution) -> Posed:
         raise NotCovered(f"the objective is optimised over the designs with {problem.locate}, whatever their abscissa")
     if solution.structure == "undecided":
         raise NotCovered("double precision cannot tell which roots meet")
+    if problem.model.polynomial is None:
+        raise NotCovered("the matrices are too large for the polynomial that these conditions use")
     if problem.locate:
         problem = problem.derive(locate=None, minimize="abscissa")
     if demands_heavy_damping(problem):

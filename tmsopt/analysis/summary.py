@@ -10,7 +10,7 @@ from tmsopt.analysis.limits import is_physical, split_bound
 from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import describe_user_structure
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ROOT_QUANTITIES
+from tmsopt.problem.quantities import ROOT_QUANTITIES, matrices_at
 from tmsopt.problem.solution import Bound, Solution
 from tmsopt.problem.unit_system import Unit, round_one_way, unit_of
 
@@ -149,6 +149,9 @@ def _evaluate_signature(
 ) -> tuple[list[float], list[float]]:
     """Monic coefficients, and the values of expressions with fixed root quantities."""
     values = problem.values(problem.ordered(parameters))
+    if problem.model.polynomial is None:
+        entries = matrices_at(problem.model, problem.parameter_set, parameters).ravel()
+        return [*entries.real, *entries.imag], [float(e(values)) for e in expressions]
     a = np.array([float(c) for c in values.coefficients])
     values = values.with_known(dict.fromkeys(_ROOT_NAMES, 0.5))
     with np.errstate(all="ignore"):

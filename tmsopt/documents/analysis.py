@@ -84,4 +84,5 @@ class Analysis:
     @property
     def _can_be_analysed(self) -> bool:
         solution = self.solution
-        return math.isfinite(solution.abscissa) and solution.status != "infeasible" and not solution.interrupted
+        is_solved = solution.status != "infeasible" and not solution.interrupted
+        return math.isfinite(solution.abscissa) and is_solved and solution.problem.model.polynomial is not None

@@ -21,7 +21,7 @@ from tmsopt.models.user_spectrum import user_roots
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import depends_on_case
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, SIMPLE_STRUCTURES
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES, SIMPLE_STRUCTURES, roots_at
 from tmsopt.problem.units import Reading, frequencies, readings
 from tmsopt.records import Numbers, Table
 from tmsopt.roots import Root, Structure
@@ -181,6 +181,9 @@ class _Design:
 
         If roots remain undecided, the result is None, or at the last precision the roots of the recheck.
         """
+        if self.problem.model.polynomial is None:  # the eigenvalues are computed in doubles
+            worst = roots_at(self.problem.model, self.problem.parameter_set, self.checked.worst.applied(self.exact))
+            return _as_enclosed(worst), {case: _as_enclosed(s.roots) for case, s in self.structures.items()}
         stored = enclosed_roots(self.values(self.checked.worst).coefficients)
         ideal: dict[Case, _Roots] = {}
         for case, structure in self.structures.items():
@@ -196,14 +199,17 @@ class _Design:
                 nearest = nearest_roots(coefficients, structure.roots)
             if (nearest is None or stored is None) and not is_last:
                 return None
-            checked_roots = (EnclosedRoot(flint.arb(r.re), flint.arb(r.im), r.multiplicity) for r in structure.roots)
-            ideal[case] = tuple(checked_roots) if nearest is None else nearest
+            ideal[case] = _as_enclosed(structure.roots) if nearest is None else nearest
         return stored or (), ideal
 
     def values(self, case: Case) -> Values:
         """Everything derived from the exact parameters in a case, without root quantities."""
         exact_case = Case(Table(_convert_exactly(case.at)), Table(_convert_exactly(case.offset)))
         return Values(self.problem.model, self.problem.parameter_set, exact_case.applied(self.exact))
+
+
+def _as_enclosed(roots: Sequence[Root]) -> _Roots:
+    return tuple(EnclosedRoot(flint.arb(r.re), flint.arb(r.im), r.multiplicity) for r in roots)
 
 
 def _convert_exactly(table: Numbers) -> dict[str, Any]:

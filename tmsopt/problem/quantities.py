@@ -11,8 +11,10 @@ import flint
 import numpy as np
 
 from tmsopt.models import Model, ParameterSet, Quantity, Values
-from tmsopt.records import AnyNumbers, Array
-from tmsopt.roots import Root, Structure, exact_roots, structure
+from tmsopt.records import AnyNumbers, Array, Complex
+from tmsopt.roots import Root, Structure, exact_roots, spectrum, structure
+from tmsopt.roots.chains import eigenvalues_of
+from tmsopt.roots.polynomial import rightmost_first
 
 STRUCTURE_TOLERANCE = 1e-11
 """Roots count as multiple if a relative change of the coefficients by this amount makes them multiple.
@@ -46,6 +48,8 @@ def _may_have_huge_roots(a: Array) -> Any:
 
 def _structure(values: AnyNumbers) -> Structure:
     assert isinstance(values, Values)
+    if values.model.polynomial is None:
+        return _spectrum_at(*values.given)
     a = [float(c) for c in values.coefficients]
     undecided = Structure("undecided", (), math.inf)
     if not all(map(math.isfinite, a)) or _may_have_huge_roots(np.array(a)):
@@ -60,6 +64,20 @@ def _structure(values: AnyNumbers) -> Structure:
     if is_simple and _root_error(np.array(a), root_structure) > _MAX_ERROR:
         root_structure = replace(root_structure, roots=roots_at(*values.given) or root_structure.roots)
     return root_structure
+
+
+def _spectrum_at(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) -> Structure:
+    """The structure of the eigenvalues of a design's matrices; without roots if the leading matrix is singular."""
+    try:
+        return spectrum(matrices_at(model, parameter_set, parameters), STRUCTURE_TOLERANCE, model.is_complex)
+    except np.linalg.LinAlgError:
+        return Structure("undecided", (), math.inf)
+
+
+def matrices_at(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) -> Complex:
+    """The matrices of a design in doubles, in descending powers, shape (d + 1, n, n)."""
+    assert model.pencil is not None
+    return np.array(model.pencil(parameter_set.native({n: float(x) for n, x in parameters.items()})), dtype=complex)
 
 
 def _root_error(a: Array, root_structure: Structure) -> float:
@@ -77,8 +95,15 @@ def _cached_structure(a: tuple[float, ...], roundings: tuple[float, ...]) -> Str
 def roots_at(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) -> tuple[Root, ...]:
     """Exact roots for parameters in double precision, rightmost first; none if a coefficient is undefined.
 
-    The parameters count as exact, coefficients have 120 digits, and roots are isolated in interval arithmetic.
+    The parameters count as exact, coefficients have 120 digits, and roots are isolated in interval arithmetic. For
+    large matrices the roots are the computed eigenvalues.
     """
+    if model.polynomial is None:
+        try:
+            eigenvalues = eigenvalues_of(matrices_at(model, parameter_set, parameters))
+        except np.linalg.LinAlgError:
+            return ()
+        return rightmost_first(Root(float(z.real), float(z.imag)) for z in eigenvalues)
     with flint.ctx.workdps(_DIGITS):
         exact_parameters = {name: flint.arb(value) for name, value in parameters.items()}
         coefficients = model.coefficients(exact_parameters, parameter_set)
