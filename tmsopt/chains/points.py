@@ -8,7 +8,7 @@ so that conditions that a symmetry fulfils for all parameters do no harm.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,12 +19,12 @@ from tmsopt.roots.chains import (
     MIN_SECOND_VALUE,
     Chain,
     Cluster,
-    eigenvalues_of,
     find_borders,
     linearise,
     linearised_slopes,
     make_chain,
     make_cluster,
+    schur_form,
     size_at,
 )
 
@@ -39,6 +39,7 @@ _MAX_CHAIN_STEPS = 60
 _STALLED_STEPS = 3  # steps without a smaller residual that end the second stage
 _PROGRESS = 0.5  # a step that leaves more than this share of the error has stalled
 _STILL = 4e-16  # a step of this share of the ranges, and an error of this size, are at rounding
+_ROUNDING = 32 * float(np.finfo(float).eps)  # of the equations, relative to their terms
 _CUTOFF = 1e-10  # relative singular values below this count as 0 in a step
 _MAX_STEP = 0.5  # longest step of a parameter in the second stage, as a share of its range
 _DISTINCT = 1e-6  # relative distance below which two eigenvalues of a pattern are one
@@ -94,6 +95,8 @@ class ExceptionalPoint:
         chains: the chain of each target.
         backward_error: largest relative change of the matrices that makes a chain exact.
         second_value: least second smallest singular value, relative to the size of the matrices.
+        sensitivity: largest effect on each parameter of a relative change of the equations; inf if the equations do
+            not determine the parameters.
         steps: steps of the two stages.
     """
 
@@ -101,12 +104,23 @@ class ExceptionalPoint:
     chains: tuple[Chain, ...]
     backward_error: float
     second_value: float
+    sensitivity: Array
     steps: tuple[int, int] = (0, 0)
 
     @property
     def roots(self) -> tuple[complex, ...]:
         """The multiple eigenvalues, in the unit of the family."""
         return tuple(chain.s for chain in self.chains)
+
+    @property
+    def is_isolated(self) -> bool:
+        """Whether the equations determine the parameters."""
+        return bool(np.isfinite(self.sensitivity).all())
+
+    def estimate_errors(self, names: Sequence[str]) -> dict[str, float]:
+        """Error bounds of the parameters, and of the abscissa, from the rounding of the equations."""
+        errors = (_ROUNDING * self.sensitivity).tolist()
+        return dict(zip(names, errors, strict=True)) | {"abscissa": 0.0}
 
     @property
     def is_defective(self) -> bool:
@@ -171,19 +185,19 @@ def _gather(
     family: Family, targets: Sequence[Target], start: Array, rng: np.random.Generator | None
 ) -> _Gathered | None:
     """Bring the eigenvalues of each target together, by damped Gauss–Newton steps in the box."""
-    eigenvalues = eigenvalues_of(family.matrices(start))
-    size = float(np.abs(eigenvalues - eigenvalues.mean()).max() or np.abs(eigenvalues).max()) or 1.0
-    groups: Sequence[Complex | None] = _choose_groups(eigenvalues, targets, family, rng)
-    state = _measure(family, targets, start, groups, size)
+    spectrum = _Spectrum(family, start)
+    s = spectrum.form.eigenvalues
+    size = float(np.abs(s - s.mean()).max() or np.abs(s).max()) or 1.0
+    state = _measure(spectrum, targets, _choose_groups(s, targets, family, rng), size)
     while state and state.steps < _MAX_CLUSTER_STEPS:
         if state.largest_distance(targets) <= _CLOSE * size:
             break
         step, damping = _step_in_box(state.jacobian, state.residual, state.p, family), 1.0
         while damping > _MIN_DAMPING:
-            p = np.clip(state.p + damping * step, *family.box.T)
-            eigenvalues = eigenvalues_of(family.matrices(p))
-            groups = [_nearest(eigenvalues, mean, t, family) for mean, t in zip(state.means, targets, strict=True)]
-            trial = _measure(family, targets, p, groups, size)
+            spectrum = _Spectrum(family, np.clip(state.p + damping * step, *family.box.T))
+            pairs = zip(state.means, targets, strict=True)
+            groups = [_nearest(spectrum.form.eigenvalues, mean, t, family) for mean, t in pairs]
+            trial = _measure(spectrum, targets, groups, size)
             if trial and np.linalg.norm(trial.residual) <= (1 - _DECREASE * damping) * np.linalg.norm(state.residual):
                 break
             damping /= 2
@@ -194,25 +208,33 @@ def _gather(
     return state
 
 
+class _Spectrum:
+    """The matrices of a design with the Schur form of their linearisation."""
+
+    def __init__(self, family: Family, p: Array) -> None:
+        self.family, self.p = family, p
+        self.matrices, self.slopes = family.expand(p)
+        self.form = schur_form(linearise(self.matrices), family.is_complex)
+
+
 def _measure(
-    family: Family, targets: Sequence[Target], p: Array, groups: Sequence[Complex | None], size: float
+    spectrum: _Spectrum, targets: Sequence[Target], groups: Sequence[Complex | None], size: float
 ) -> _Gathered | None:
     """The clusters of groups of eigenvalues, their power sums and distances from the axes in powers of `size`."""
-    matrices, slopes = family.expand(p)
-    M, changes = linearise(matrices), linearised_slopes(matrices, slopes)
-    clusters = [cluster for group in groups if group is not None and (cluster := make_cluster(M, group))]
-    if len(clusters) < len(groups):
+    clusters = [make_cluster(spectrum.form, group) for group in groups if group is not None]
+    if len(clusters) < len(targets):
         return None
+    changes = linearised_slopes(spectrum.matrices, spectrum.slopes)
     residual, jacobian = list[Array](), list[Array]()
     for cluster, target in zip(clusters, targets, strict=True):
         scale = size ** -np.arange(1.0, target.order + 1)
         responses = [cluster.respond(change) for change in changes]
         rows = np.array([_stack(cluster.mean, cluster.power_sums, target), *(_stack(*r, target) for r in responses)])
         rows = (rows * scale).T
-        parts = rows.real if target.is_real(family.is_complex) else np.concatenate([rows.real, rows.imag])
+        parts = rows.real if target.is_real(spectrum.family.is_complex) else np.concatenate([rows.real, rows.imag])
         residual.append(parts[:, 0])
         jacobian.append(parts[:, 1:])
-    return _Gathered(p, tuple(clusters), np.concatenate(residual), np.concatenate(jacobian))
+    return _Gathered(spectrum.p, tuple(clusters), np.concatenate(residual), np.concatenate(jacobian))
 
 
 def _stack(mean: complex, power_sums: Complex, target: Target) -> Complex:
@@ -313,7 +335,8 @@ def refine(
     p = np.where(np.abs(best.p) <= _STILL * family.widths, 0.0, best.p)
     matrices = family.matrices(p)
     seconds = [find_borders(matrices, c.s)[2] / size_at(matrices, c.s) for c in best.chains]
-    return ExceptionalPoint(p, best.chains, best.error, min(seconds), (steps, step_count))
+    sensitivity = _measure_sensitivity(best, family.widths)
+    return ExceptionalPoint(p, best.chains, best.error, min(seconds), sensitivity, (steps, step_count))
 
 
 def measure_point(family: Family, targets: Sequence[Target], p: Array) -> ExceptionalPoint | None:
@@ -373,12 +396,25 @@ def _chain_step(
     slopes = equations.slopes * family.widths
     basis = np.linalg.qr(equations.root_slopes, mode="complete")[0][:, equations.root_slopes.shape[1] :]
     U, values, V = np.linalg.svd(basis.T @ slopes)
-    rank = int(np.sum(values > _CUTOFF * max(values[0], 1e-300))) if values.size else 0
+    rank = _rank(values)
     right = (U[:, :rank].T @ basis.T @ -equations.residual) / values[:rank]
     step = V[:rank].T @ right + V[rank:].T @ (V[rank:] @ pull)
     rest = -equations.residual - slopes @ step
     moves = iter(np.linalg.lstsq(equations.root_slopes, rest, rcond=_CUTOFF)[0].tolist())
     return step, [sum((d * next(moves) for d in target.directions), 0j) for target in targets]
+
+
+def _rank(values: Any) -> int:
+    """Number of singular values that are not 0."""
+    return int(np.sum(values > _CUTOFF * max(values[0], 1e-300))) if values.size else 0
+
+
+def _measure_sensitivity(equations: _ChainEquations, widths: Array) -> Array:
+    basis = np.linalg.qr(equations.root_slopes, mode="complete")[0][:, equations.root_slopes.shape[1] :]
+    reduced = basis.T @ equations.slopes * widths
+    if not np.isfinite(reduced).all() or _rank(np.linalg.svd(reduced, compute_uv=False)) < len(widths):
+        return np.full(len(widths), np.inf)
+    return np.asarray(widths * np.abs(np.linalg.pinv(reduced)).sum(axis=1))
 
 
 def _project(s: complex, target: Target) -> complex:

@@ -26,6 +26,9 @@ from tmsopt.records import Complex, Numbers
 from tmsopt.roots import Pattern, composition
 from tmsopt.roots.chains import Chain, expand
 
+MAX_PROVED_SIZE = 40
+"""Largest number of roots of a system whose points are proved in a search; a larger one takes seconds for each."""
+
 _ON_AXIS = 1e-9  # relative distance of an eigenvalue from the axis of a symmetry
 _PROOF_DIGITS = 40  # decimal digits of a proved point
 

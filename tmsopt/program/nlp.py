@@ -13,6 +13,7 @@ import numpy as np
 from tmsopt.algebra.formula import Formula, Kind, constant, fold, formula, symbol
 from tmsopt.algebra.kinds import CASADI, FLOATS, NODES
 from tmsopt.algebra.sequence import golden_steps
+from tmsopt.chains.family import family_of
 from tmsopt.models import Values
 from tmsopt.problem.cases import Case
 from tmsopt.problem.evaluate import coefficients_of, evaluate
@@ -339,6 +340,8 @@ def scale_of(problem: Posed) -> Scale:
     """Median sizes of roots and leading coefficients over the box, so that tolerances are relative to them."""
     if problem.model.natural:
         return Scale()
+    if problem.model.polynomial is None:
+        return Scale(_power_of_two(np.array([family_of(problem).typical_size])))
     columns = coefficients_of(problem, problem.ordered(_spread_designs(problem)))
     a = np.stack(np.broadcast_arrays(*columns), axis=-1)
     a = a.reshape(-1, a.shape[-1])

@@ -18,6 +18,7 @@ from tmsopt.program.nlp import Scale
 from tmsopt.proofs.factorisation import Factorisation, factor_pattern, factor_polynomial, has_pattern
 from tmsopt.proofs.system import ROUNDINGS, Equations, MovedParameters, build_equations, choose_moved
 from tmsopt.roots import Pattern
+from tmsopt.roots.patterns.root_enclosures import EnclosedRoot
 from tmsopt.roots.patterns.structure import fit_unknowns
 
 EXACT = "exact factorisation"
@@ -45,7 +46,7 @@ class ProvedDesign:
         distance: how far the stored value of a parameter is from the proved one, for the parameter with the largest
             ratio of this distance to the distance that rounding explains.
         explained: the distance that rounding explains for this parameter.
-        has_chains: whether Jordan chains are proved, so that each multiple root of the pattern has one eigenvector.
+        chain_roots: the roots of proved Jordan chains, each of which has one eigenvector.
     """
 
     method: str
@@ -59,7 +60,7 @@ class ProvedDesign:
     radius: float = 0.0
     distance: float = 0.0
     explained: float = 0.0
-    has_chains: bool = False
+    chain_roots: tuple[EnclosedRoot, ...] = ()
 
 
 def prove_exactly(problem: Posed, pattern: Pattern, design: ExactDesign) -> ProvedDesign | None:
@@ -76,7 +77,7 @@ def enclose_stored(problem: Posed, design: ExactDesign) -> ProvedDesign | None:
     tangents = {n: x for n, x in _exact_numbers(problem, design).items() if parameter_set[n].tangent}
     exact_coefficients = design.coefficients(problem.model, parameter_set)
     a = problem.model.coefficients(balls, parameter_set) if exact_coefficients is None else exact_coefficients
-    if a[0] == 0 or flint.arb(a[0]).contains(0) or not all(flint.arb(c).is_finite() for c in a):
+    if not a or a[0] == 0 or flint.arb(a[0]).contains(0) or not all(flint.arb(c).is_finite() for c in a):
         return None
     if exact_coefficients is not None:
         return ProvedDesign(EXACT, a, balls, tangents, {}, factor_polynomial(a))
@@ -194,20 +195,29 @@ def _prove_from(system: AnyEquations, start: Mapping[str, Any], candidates: list
         largest_radius([solution[n] for n in names]),
         distance,
         explained,
-        isinstance(system, ChainEquations),
+        _list_chain_roots(system, solution) if isinstance(system, ChainEquations) else (),
     )
+
+
+def _list_chain_roots(system: ChainEquations, solution: Mapping[str, Any]) -> tuple[EnclosedRoot, ...]:
+    roots = list[EnclosedRoot]()
+    for s, target in zip(system.eigenvalues(solution), system.targets, strict=True):
+        roots.append(EnclosedRoot(s.real, s.imag, target.order))
+        if not system.is_complex and target.axis in ("complex", "imaginary"):
+            roots.append(EnclosedRoot(s.real, -s.imag, target.order))
+    return tuple(roots)
 
 
 def _factorise(system: ChainEquations, coefficients: Sequence[Any], solution: Mapping[str, Any]) -> Factorisation:
     """The polynomial of a model as a product of the multiple factors and the other roots' factor."""
-    rest = [c / coefficients[0] for c in coefficients]
+    rest = [c / coefficients[0] for c in coefficients]  # empty for large matrices
     factors = list[tuple[list[Any], int]]()
     for s, target in zip(system.eigenvalues(solution), system.targets, strict=True):
         square = s.real**2 + (s.imag - system.problem.model.carrier) ** 2
         is_real = target.is_real(system.problem.model.is_complex)
         factor = [flint.arb(1), -s.real] if is_real else [flint.arb(1), -2 * s.real, square]
         factors.append((factor, target.order))
-        for _ in range(target.order):
+        for _ in range(target.order if rest else 0):
             rest = _divide(rest, factor)
     return Factorisation((*factors, *([(rest, 1)] if len(rest) > 1 else [])))
 

@@ -59,7 +59,7 @@ def eigenvector_verdict(problem: Posed, design: ExactDesign, proved_design: Prov
         return None, Verdict(None, "a model given by its coefficients has no eigenvectors")
     if not repeated_factors:
         return None, NOT_CHECKED
-    if proved_design.has_chains:
+    if proved_design.chain_roots:
         return 1, Verdict(True, "one eigenvector, because the bordered matrix is regular (interval arithmetic)")
     matrices = design.matrices(problem.model, parameter_set) if proved_design.method == EXACT else None
     if matrices:

@@ -46,6 +46,8 @@ MAX_DIGITS = 1000
 _QUARTIC = 4  # the degree of `PATTERNS`
 _EXTRA_DIGITS = 50  # decimal digits of the arithmetic beyond twice the requested ones, for a design taken as stored
 
+_TOO_LARGE = Verdict(None, "the matrices are too large for the polynomial that decides it")
+
 _SIMPLE_CLAIMS = {
     "pair": "the rightmost roots are a simple complex pair",
     "real": "the rightmost root is real and simple",
@@ -78,7 +80,8 @@ class Proof(Printable):
         distance: how far the stored value of a parameter is from the proved one, for the parameter with the largest
             ratio of this distance to the distance that rounding explains.
         explained: how far rounding of the stored numbers may move this parameter.
-        roots: all roots with exact multiplicities, rightmost first; empty if the balls of two roots overlap.
+        roots: all roots with exact multiplicities, rightmost first; empty if the balls of two roots overlap. For large
+            matrices only the multiple roots of the pattern.
         eigenfrequencies: ω = i s of a complex system, in the order of the roots.
         abscissa: the largest real part.
         geometric_multiplicity: the most independent eigenvectors of a multiple root; None if unknown.
@@ -313,12 +316,15 @@ def _assemble(
         else fraction(exact_value, digits)
         for n, ball in proved_design.parameters.items()
     }
-    abscissa = proved_design.factorisation.abscissa
+    has_all_roots = problem.model.polynomial is not None  # of large matrices only the multiple roots are enclosed
+    abscissa = proved_design.factorisation.abscissa if has_all_roots else None
     is_real = not problem.model.is_complex
     # For a complex H, these are unknowns of a real matrix that the user did not state.
     hidden_unknowns = () if is_real or pattern is None else pattern.unknowns
     hidden_unknowns = (*hidden_unknowns, *(f"{pattern.name}.{n}" for n in hidden_unknowns)) if pattern else ()
     roots = user_roots(problem.model, proved_design.factorisation.roots or ())
+    if not has_all_roots:
+        roots = proved_design.chain_roots
     geometric_multiplicity, defective = eigenvector_verdict(problem, design, proved_design)
     if not reasons and geometric_multiplicity is not None and geometric_multiplicity > 1 and "EP" in name:
         reasons = [f"{'not an EP' if defective.holds else CROSSING}: {defective.words}"]
@@ -350,8 +356,8 @@ def _assemble(
         abscissa=None if abscissa is None else number(abscissa, digits),
         geometric_multiplicity=geometric_multiplicity,
         defective=defective,
-        stable=stability_verdict(proved_design.factorisation, not is_real),
-        heavily_damped=heavy_damping_verdict(proved_design.factorisation) if is_real else NOT_CHECKED,
+        stable=stability_verdict(proved_design.factorisation, not is_real) if has_all_roots else _TOO_LARGE,
+        heavily_damped=heavy_damping_verdict(proved_design.factorisation) if is_real and has_all_roots else NOT_CHECKED,
         inside=box_verdict(problem, design, proved_design),
         limits=Table(limit_verdicts(problem, proved_design)),
     )

@@ -5,7 +5,7 @@ first. `patterns` finds out which roots coincide, and `quartics` solves millions
 """
 
 from tmsopt.roots.batch import classify, find_motion
-from tmsopt.roots.chains import make_cluster
+from tmsopt.roots.chains import make_cluster, schur_form
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.jordan import exact_longest, exact_nullity, has_one_eigenvector, is_regular, jordan
@@ -60,6 +60,7 @@ __all__ = [
     "rebuilt",
     "roots",
     "routh",
+    "schur_form",
     "shift",
     "spectrum",
     "structure",

@@ -234,28 +234,48 @@ class Cluster:
         return change_of_mean, np.array(sums, dtype=complex)
 
 
-def make_cluster(matrix: Complex, eigenvalues: Complex) -> Cluster | None:
-    """The cluster of the given eigenvalues of a matrix; None if the Schur form does not separate them.
+@dataclass(frozen=True)
+class SchurForm:
+    """A matrix as Q T Q* with an upper triangular T.
+
+    Attributes:
+        eigenvalues: those of a real matrix are exactly real or conjugate, and may be in another order than in T.
+    """
+
+    T: Complex
+    Q: Complex
+    eigenvalues: Complex
+
+
+def schur_form(matrix: Complex, is_complex: bool) -> SchurForm:
+    """The Schur form of a matrix, which may be real."""
+    from scipy.linalg import schur
+
+    T, Q = schur(matrix, output="complex")
+    eigenvalues = np.diag(T) if is_complex else np.linalg.eigvals(matrix.real)
+    return SchurForm(T, Q, np.asarray(eigenvalues, dtype=complex))
+
+
+def make_cluster(form: SchurForm, eigenvalues: Complex) -> Cluster:
+    """The cluster of the given eigenvalues of a matrix.
 
     Example:
-        >>> cluster = tmsopt.roots.make_cluster(np.diag([1.0, 1.5, 9.0]).astype(complex), np.array([1.0, 1.5]))
-        >>> cluster.mean, cluster.spread
+        >>> form = tmsopt.roots.schur_form(np.diag([1.0, 1.5, 9.0]).astype(complex), is_complex=False)
+        >>> cluster = tmsopt.roots.make_cluster(form, np.array([1.0, 1.5]))
+        >>> cluster.mean, cluster.radius
         ((1.25+0j), 0.25)
 
     More: docs/explanation/jordan_chains.md
     """
-    from scipy.linalg import schur, solve_sylvester
+    from scipy.linalg import solve_sylvester
+    from scipy.linalg.lapack import ztrsen
 
-    k, all_eigenvalues = len(eigenvalues), np.linalg.eigvals(matrix)
-    distances = np.abs(all_eigenvalues[:, None] - eigenvalues).min(axis=1)
-    order = np.sort(distances)
-    limit = (order[k - 1] + order[k]) / 2 if k < len(matrix) else np.inf
-    sorted_schur: Any = schur  # its types leave out a function of complex numbers
-    T, Q, count = sorted_schur(matrix, output="complex", sort=lambda z: bool(np.abs(z - eigenvalues).min() <= limit))
-    if count != k:
-        return None
+    k, distances = len(eigenvalues), np.abs(np.diag(form.T)[:, None] - eigenvalues).min(axis=1)
+    chosen = np.zeros(len(form.T), dtype=np.int32)
+    chosen[np.argsort(distances, kind="stable")[:k]] = 1
+    T, Q, *_ = ztrsen(chosen, form.T, form.Q, job=b"N")
     block, left = T[:k, :k], Q.conj().T
-    if k < len(matrix):
+    if k < len(T):
         left = np.hstack([np.eye(k), solve_sylvester(block, -T[k:, k:], T[:k, k:])]) @ left
     mean = complex(np.trace(block)) / k
-    return Cluster(mean, block - mean * np.eye(k), Q[:, :k], left)
+    return Cluster(mean, block - mean * np.eye(k), Q[:, :k], left[:k])

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.records import Complex
-from tmsopt.roots.chains import linearise, make_cluster
+from tmsopt.roots.chains import SchurForm, linearise, make_cluster, schur_form
 from tmsopt.roots.patterns.complex_patterns import complex_name
 from tmsopt.roots.patterns.shape import Group
 from tmsopt.roots.patterns.structure import Structure, name_line
@@ -40,9 +40,10 @@ def spectrum(matrices: Complex, tolerance: float, is_complex: bool) -> Structure
     More: docs/explanation/jordan_chains.md
     """
     M = linearise(matrices)
-    eigenvalues = np.asarray(np.linalg.eigvals(M), dtype=complex)
+    form = schur_form(M, is_complex)
+    eigenvalues = form.eigenvalues
     size = float(np.linalg.norm(M, 2)) or 1.0
-    found = [*_split(M, eigenvalues, _connect(eigenvalues), [*range(len(eigenvalues))], tolerance, size)]
+    found = [*_split(form, _connect(eigenvalues), [*range(len(eigenvalues))], tolerance, size)]
     zero = 4 * np.finfo(float).eps * size
     roots = [Root(_drop(z.real, zero), z.imag if is_complex else _drop(z.imag, tolerance * size), k) for z, k in found]
     if not is_complex:  # the two of a pair differ by their rounding only
@@ -62,22 +63,22 @@ def _drop(x: float, zero: float) -> float:
 
 
 def _split(
-    M: Complex, eigenvalues: Complex, tree: Tree, members: list[int], tolerance: float, size: float
+    form: SchurForm, tree: Tree, members: list[int], tolerance: float, size: float
 ) -> Iterator[tuple[complex, int]]:
     """The means of the largest groups of eigenvalues that coincide within the tolerance, each with its number.
 
     Args:
         tree: the edges between the members, the longest first.
     """
-    group, k = eigenvalues[members], len(members)
+    group, k = form.eigenvalues[members], len(members)
     if k == 1:
         yield complex(group[0]), 1
         return
     distances, change = group - group.mean(), tolerance * size
     sums = (np.sum(distances**j) for j in range(2, k + 1))
     if np.abs(distances).max() <= _MARGIN * size * tolerance ** (1 / k) and _vanish(sums, change, size):
-        cluster = make_cluster(M, group)
-        if cluster is not None and _vanish(cluster.power_sums, change, float(np.linalg.norm(cluster.block))):
+        cluster = make_cluster(form, group)
+        if _vanish(cluster.power_sums, change, float(np.linalg.norm(cluster.block))):
             yield cluster.mean, k
             return
     (_, start, _), *rest = tree
@@ -87,7 +88,7 @@ def _split(
     for is_in_part in (True, False):
         own = [m for m in members if (m in part) is is_in_part]
         edges = [edge for edge in rest if (edge[1] in part) is is_in_part]
-        yield from _split(M, eigenvalues, edges, own, tolerance, size)
+        yield from _split(form, edges, own, tolerance, size)
 
 
 def _vanish(power_sums: Iterable[Any], change: float, length: float) -> bool:

@@ -1,16 +1,19 @@
 """Find all designs with a pattern in a box: with a proof, or from many starts with an estimate of missed designs."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 from typing import Any, Unpack
 
 import numpy as np
 
+from tmsopt.chains import family_of, find_point, targets_of
 from tmsopt.errors import input_error, is_number, short
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.global_search import Completeness, prove_completeness
+from tmsopt.global_search.chain_equations import MAX_PROVED_SIZE, prove_point
 from tmsopt.global_search.completeness import SECONDS
 from tmsopt.problem import Posed, ProblemSource, Solution, degrees_of_freedom, pose
 from tmsopt.problem.validate import MIN_SIZE
@@ -22,6 +25,7 @@ from tmsopt.progress import begin
 from tmsopt.records import Array, Table, Tabular, plain
 from tmsopt.search.all_points import prove_all_points
 from tmsopt.search.local_search import solve_from
+from tmsopt.search.locate import has_chains
 from tmsopt.search.newton import build_square_system, estimate_error, find_zero, make_zero
 from tmsopt.search.solve import solve_any_status
 from tmsopt.search.state import SearchState, Start, clip_to_box, is_close
@@ -145,32 +149,36 @@ def solve_all(problem: ProblemSource, *, seconds: float = SECONDS, **options: Un
     problem = pose(problem)
     if not is_number(seconds):
         raise input_error(f"found {short(seconds)}; accepted: a number of seconds", "seconds")
-    nlp = _build_equations(problem)
-    state = SearchState(problem, problem, nlp, make_options(options, defaults=_DEFAULTS))
-    begin(state.options.progress, "proving that no design is missed", "s")
+    _check_isolated(problem)
+    own_options = make_options(options, defaults=_DEFAULTS)
+    begin(own_options.progress, "proving that no design is missed", "s")
     proof = prove_all_points(problem) if seconds > 0 else None
-    if proof is None and seconds > 0:
-        proof = prove_completeness(problem, seconds, state.options.progress)
+    if proof is None and seconds > 0 and problem.model.polynomial is not None:
+        proof = prove_completeness(problem, seconds, own_options.progress)
     proved_entries = list[_IsolatedDesign]()
     for intervals in proof.designs if proof else ():
         errors = {n: float(x.radius) for n, x in intervals.items()} | {"abscissa": 0.0}
         design = clip_to_box(problem, {n: float(x) for n, x in intervals.items()})
         proved_entries.append(_IsolatedDesign(_drop_tiny(design), errors))
-    search_entries, coverage = ([], None) if proof and (proof.complete or proof.stopped) else _search_starts(state)
+    search_entries, coverage = (
+        ([], None) if proof and (proof.complete or proof.stopped) else _search_starts(problem, own_options)
+    )
     proof_only_entries = [
         entry for entry in proved_entries if not any(entry.is_same(problem, other) for other in search_entries)
     ]
     if coverage:
         coverage = replace(coverage, hits=(*coverage.hits, *[0] * len(proof_only_entries)))
+    can_prove = seconds > 0 and has_chains(problem) and problem.model.size <= MAX_PROVED_SIZE
     solutions, proved_flags, bounds = list[Solution](), list[bool](), list[Table[float]]()
     for entry in (*search_entries, *proof_only_entries):
         solution = _make_solution(problem, entry.design)
         matches = [other for other in proved_entries if entry.is_same(problem, other)]
+        is_proved = bool(matches) or (can_prove and prove_point(problem, problem.ordered(entry.design)) is not None)
         errors = entry.errors | (matches[0].errors if matches else {})
         largest_root = max((r.size for r in solution.roots), default=0.0)
         sizes = {n: abs(solution.parameters[n]) for n in problem.free} | {"abscissa": largest_root}
         solutions.append(solution)
-        proved_flags.append(bool(matches))
+        proved_flags.append(is_proved)
         bounds.append(Table({n: max(errors.get(n, 0.0), _MIN_ERROR * x) for n, x in sizes.items()}))
     return Every(tuple(solutions), coverage, proof, tuple(proved_flags), tuple(bounds))
 
@@ -187,42 +195,39 @@ class _IsolatedDesign:
         return is_close(problem, self.design, other.design, _SAME_DESIGN)
 
 
-def _search_starts(state: SearchState) -> tuple[list[_IsolatedDesign], Coverage]:
+@dataclass
+class _End:
+    """Where a start ended: free parameters, whether the solution is isolated there, and a function for its errors."""
+
+    design: dict[str, float]
+    is_isolated: bool
+    estimate_errors: Callable[[], dict[str, float]]
+
+
+def _search_starts(problem: Posed, options: Options) -> tuple[list[_IsolatedDesign], Coverage]:
     """Search from many starts; return the solutions found, the most frequent first, and the coverage."""
-    problem, nlp, starts, progress = state.problem, state.nlp, state.options.starts, state.options.progress
+    progress = options.progress
     begin(progress, "searching", "start")
-    system = build_square_system(nlp)
-    assert system is not None  # as many conditions as parameters
+    find_ends = _find_chain_ends if has_chains(problem) else _find_factor_ends
     entries = list[_IsolatedDesign]()
     start_count = singular = crossings = 0
-    for start in islice(sample_box(problem, state.options.seed), starts):
-        if _is_covered(start_count, [entry.hits for entry in entries]):
-            break
-        ends = [find_zero(system, x) for x in complete_starts(nlp, problem, start)]
-        if start_count % _STARTS_PER_IPOPT_RUN == 0 and (local := solve_from(state, Start(start, near=False))).feasible:
-            ends.append(find_zero(system, local.run.x) or make_zero(system, local.run.x))
+    for ends in find_ends(problem, options):
         reached_entries = set[_IsolatedDesign]()
         found_singular = found_crossing = False
-        for end in filter(None, ends):
-            design = _take_design(problem, nlp, end.x)
-            if design is None:
-                continue
-            entry = _IsolatedDesign(design, {})
+        for end in ends:
+            entry = _IsolatedDesign(end.design, {})
             match = next((other for other in entries if entry.is_same(problem, other)), None)
             if end.is_isolated and match:
                 reached_entries.add(match)
                 continue
-            checked = recheck(problem, problem.ordered(design))
-            if not end.is_isolated:
+            checked = recheck(problem, problem.ordered(end.design))
+            if checked.is_crossing or not end.is_isolated:
                 found_singular, found_crossing = (
                     found_singular or not checked.violations,
                     found_crossing or checked.is_crossing,
                 )
             elif not checked.violations:
-                # An angle's error is at most its tangent's; the other variables are the factors' coefficients.
-                errors = estimate_error(system, end.x).tolist()
-                entry.errors = dict(zip(problem.free, errors, strict=False))
-                entry.errors["abscissa"] = max(errors[len(problem.free) :], default=0.0)
+                entry.errors = end.estimate_errors()
                 entries.append(entry)
                 reached_entries.add(entry)
         for entry in reached_entries:
@@ -231,14 +236,53 @@ def _search_starts(state: SearchState) -> tuple[list[_IsolatedDesign], Coverage]
         crossings += found_crossing and not reached_entries
         start_count += 1
         if progress:
-            progress(start_count, starts)
+            progress(start_count, options.starts)
+        if _is_covered(start_count, [entry.hits for entry in entries]):
+            break
     entries.sort(key=lambda entry: -entry.hits)
     coverage = estimate_coverage(start_count, [entry.hits for entry in entries], singular)
     return entries, replace(coverage, crossings=crossings)
 
 
-def _build_equations(problem: Posed) -> NLP:
-    """Return the equations of a problem.
+def _find_factor_ends(problem: Posed, options: Options) -> Iterator[list[_End]]:
+    """The ends of Newton's method on the factors, and of IPOPT, for each start."""
+    nlp = _build_equations(problem)
+    state, system = SearchState(problem, problem, nlp, options), build_square_system(nlp)
+    assert system is not None  # as many conditions as parameters
+
+    def errors_at(x: Array) -> dict[str, float]:
+        # An angle's error is at most its tangent's; the other variables are the factors' coefficients.
+        errors = estimate_error(system, x).tolist()
+        own_errors = dict(zip(problem.free, errors, strict=False))
+        return own_errors | {"abscissa": max(errors[len(problem.free) :], default=0.0)}
+
+    for number, start in enumerate(islice(sample_box(problem, options.seed), options.starts)):
+        zeros = [find_zero(system, x) for x in complete_starts(nlp, problem, start)]
+        if number % _STARTS_PER_IPOPT_RUN == 0 and (local := solve_from(state, Start(start, near=False))).feasible:
+            zeros.append(find_zero(system, local.run.x) or make_zero(system, local.run.x))
+        ends = ((zero, _take_design(problem, nlp, zero.x)) for zero in zeros if zero)
+        yield [_End(design, zero.is_isolated, partial(errors_at, zero.x)) for zero, design in ends if design]
+
+
+def _find_chain_ends(problem: Posed, options: Options) -> Iterator[list[_End]]:
+    """The point that each start reaches by Jordan chains; where eigenvalues meet without a chain, that design."""
+    assert problem.pattern is not None
+    family, targets = family_of(problem), targets_of(problem.pattern.name, problem.model.is_complex)
+    rng = np.random.default_rng(options.seed)
+    for number, start in enumerate(islice(sample_box(problem, options.seed), options.starts)):
+        choice = rng if number % 2 else None
+        point = find_point(family, targets, np.array([start[n] for n in problem.free]), choice)
+        overshoot = _MAX_OVERSHOOT * family.widths
+        low, high = family.box.T
+        if point is None or np.any((point.p < low - overshoot) | (point.p > high + overshoot)):
+            yield []
+            continue
+        design = dict(zip(problem.free, np.clip(point.p, low, high).tolist(), strict=True))
+        yield [_End(_drop_tiny(design), point.is_isolated, partial(point.estimate_errors, list(problem.free)))]
+
+
+def _check_isolated(problem: Posed) -> None:
+    """Check that a problem asks for isolated solutions.
 
     Raises:
         InputError: if the solutions of the problem are not isolated.
@@ -255,6 +299,14 @@ def _build_equations(problem: Posed) -> NLP:
         free = f"{freedom.free} free parameter{'' if freedom.free == 1 else 's'}"
         conditions = f"{freedom.conditions} condition{'' if freedom.conditions == 1 else 's'}"
         raise input_error(f"{free} and {conditions} do not give isolated solutions; {advice}", "parameters")
+
+
+def _build_equations(problem: Posed) -> NLP:
+    """Return the equations of a problem.
+
+    Raises:
+        InputError: if a constraint needs the roots.
+    """
     nlp = formulate_matching(problem)
     if nlp.contacts:
         fault = f"the constraints use {', '.join(nlp.contacts)}, which only the roots define"

@@ -24,7 +24,7 @@ def vocabulary(model: Model, parameter_set: ParameterSet) -> dict[str, Parameter
     native = () if parameter_set is model.sets[0] else model.sets[0].parameters
     words = {0: "constant coefficient", 1: "coefficient of s"}
     entries: dict[str, Parameter | Quantity] = {}
-    for k, n in zip(range(model.degree, -1, -1), model.coefficient_names(), strict=True):
+    for k, n in zip(range(model.degree, -1, -1), model.coefficient_names(), strict=False):
         meaning = f"{words.get(k, f'coefficient of s^{k}')} in the characteristic polynomial"
         entries[n] = Quantity(n, "", meaning, f"a_{{{model.degree - k}}}", itemgetter(n))
     derived_quantities = (*model.quantities, *parameter_set.quantities, *ROOT_QUANTITIES, NO_RADIUS)

@@ -9,7 +9,7 @@ import re
 from dataclasses import replace
 from functools import cache
 
-from tmsopt.roots.patterns.components import count_in_words, multiplicity_in_words, parse_components
+from tmsopt.roots.patterns.components import count_in_words, multiplicities, multiplicity_in_words, parse_components
 from tmsopt.roots.patterns.composed import pattern
 from tmsopt.roots.patterns.descriptions import join_in_words, select_in_words
 from tmsopt.roots.patterns.pattern import Pattern
@@ -20,8 +20,8 @@ _IS_REAL_PATTERN = "is a pattern of a real system"
 
 def complex_pattern_names(size: int) -> tuple[str, ...]:
     """Names of the patterns of a `size` × `size` matrix that are not composed of other patterns."""
-    double_names = [f"2EP{k}" for k in range(size // 2, 1, -1)]
-    return (*(f"EP{k}" for k in range(size, 1, -1)), *double_names, "weave", *(["resonance"] if size > 1 else []))
+    double_names = [f"2EP{k}" for k in multiplicities(size // 2)]
+    return (*(f"EP{k}" for k in multiplicities(size)), *double_names, "weave", *(["resonance"] if size > 1 else []))
 
 
 @cache

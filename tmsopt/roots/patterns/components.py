@@ -12,7 +12,8 @@ import numpy as np
 from tmsopt.roots.patterns.pattern import Roots, quadratic
 
 _PART = re.compile(r"(?P<count>[1-9]\d*)?(?P<kind>C?EP)(?P<order>[1-9]\d*)")
-_MAX_NUMBER = 12  # largest multiplicity, and largest number of multiple roots of one kind
+_MAX_LISTED = 12  # higher multiplicities are not listed, except the highest
+_MAX_NUMBER = 100  # largest multiplicity, and largest number of multiple roots of one kind
 
 AXIS_ROOT_COUNTS = {"weave": 2, "resonance": 4, "capsize": 1}
 """Patterns on the imaginary axis → number of their roots."""
@@ -32,7 +33,13 @@ NUMBER_WORDS = ["no", "one", "two", "three", "four", "five", "six", "seven", "ei
 
 def count_in_words(count: int, noun: str) -> str:
     """A number of things in words: ``a real root``, ``two real roots``."""
-    return f"a {noun}" if count == 1 else f"{NUMBER_WORDS[count]} {noun}s".replace("ys", "ies")
+    number = NUMBER_WORDS[count] if count < len(NUMBER_WORDS) else count
+    return f"a {noun}" if count == 1 else f"{number} {noun}s".replace("ys", "ies")
+
+
+def multiplicities(largest: int) -> list[int]:
+    """The multiplicities whose patterns are listed, the highest first: all, or the lowest and the highest of many."""
+    return [k for k in range(largest, 1, -1) if k in (largest, *range(2, _MAX_LISTED + 1))]
 
 
 def multiplicity_in_words(order: int) -> str:

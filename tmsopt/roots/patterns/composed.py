@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.roots.numeric import rebuilt
-from tmsopt.roots.patterns.components import AXIS_ROOT_COUNTS, END_EVENTS, Component, parse_components
+from tmsopt.roots.patterns.components import AXIS_ROOT_COUNTS, END_EVENTS, Component, multiplicities, parse_components
 from tmsopt.roots.patterns.pattern import QUARTIC, Pattern, Roots
 from tmsopt.roots.polynomial import evaluate, product as multiply_polynomials
 from tmsopt.roots.sign_tests import double_root_test, weave_test
@@ -25,9 +25,9 @@ _MAX_CHOICES = 512  # choices of roots that are tried; the nearest choices give 
 
 def pattern_names(degree: int) -> tuple[str, ...]:
     """Names of the patterns for a degree that are not composed of other patterns."""
-    single_real = [f"EP{k}" for k in range(degree, 1, -1)]
-    double_real = [f"2EP{k}" for k in range(degree // 2, 1, -1)]
-    double_pairs = [f"CEP{k}" for k in range(degree // 2, 1, -1)]
+    single_real = [f"EP{k}" for k in multiplicities(degree)]
+    double_real = [f"2EP{k}" for k in multiplicities(degree // 2)]
+    double_pairs = [f"CEP{k}" for k in multiplicities(degree // 2)]
     return (
         *single_real,
         *double_real,
