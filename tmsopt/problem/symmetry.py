@@ -86,6 +86,8 @@ def find_symmetry(problem: Posed) -> Symmetry:
         return Symmetry(is_real=len(others) == 2 and all(constant(x).fraction == 0 for row in others[1] for x in row))
     H = [[Pair(x.im, -x.re) for x in row] for row in rows]  # the rows are those of i H
     n = len(H)
+    if len(others) != 1:
+        return NONE
     mean = sum((H[k][k] for k in range(n)), Pair(constant(0))) / n
     H = [[x - mean if i == j else x for j, x in enumerate(row)] for i, row in enumerate(H)]
     conjugate = [[Pair(x.re, -x.im) for x in row] for row in H]

@@ -46,7 +46,7 @@ MAX_DIGITS = 1000
 _QUARTIC = 4  # the degree of `PATTERNS`
 _EXTRA_DIGITS = 50  # decimal digits of the arithmetic beyond twice the requested ones, for a design taken as stored
 
-_TOO_LARGE = Verdict(None, "the matrices are too large for the polynomial that decides it")
+_UNKNOWN = Verdict(None, "only the multiple roots of large or complex matrices are enclosed")
 
 _SIMPLE_CLAIMS = {
     "pair": "the rightmost roots are a simple complex pair",
@@ -356,7 +356,7 @@ def _assemble(
         abscissa=None if abscissa is None else number(abscissa, digits),
         geometric_multiplicity=geometric_multiplicity,
         defective=defective,
-        stable=stability_verdict(proved_design.factorisation, not is_real) if has_all_roots else _TOO_LARGE,
+        stable=stability_verdict(proved_design.factorisation, not is_real) if has_all_roots else _UNKNOWN,
         heavily_damped=heavy_damping_verdict(proved_design.factorisation) if is_real and has_all_roots else NOT_CHECKED,
         inside=box_verdict(problem, design, proved_design),
         limits=Table(limit_verdicts(problem, proved_design)),

@@ -10,8 +10,8 @@ from tmsopt.models.model import Matrices, Matrix
 from tmsopt.models.stated.pairs import Pair, pair
 from tmsopt.roots.polynomial import characteristic_polynomial, product, quadratic_pencil
 
-IMAGINARY_KEY = "H, imaginary part"
-"""Key of the imaginary part of a complex H; the key ``H`` then has the real part."""
+IMAGINARY = ", imaginary part"
+"""Suffix of the key of the imaginary part of a complex matrix; the key without it has the real part."""
 
 
 def user_key(key: str) -> str:
@@ -19,13 +19,24 @@ def user_key(key: str) -> str:
     return key.partition(",")[0]
 
 
-def sort_places(kind: str, places: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Sort places, each a key and a position, in the user's order: the two parts of an entry of H stay together."""
-    return (
-        sorted(places, key=lambda place: (place[0] == "quantities", place[1]))
-        if kind == "hamiltonian"
-        else list(places)
-    )
+def join_parts(parts: dict[str, Matrix]) -> dict[str, Matrix]:
+    """Complex matrices from their real and imaginary parts, with pairs as entries; real ones stay the same."""
+    return {
+        n: [list(map(Pair, *both)) for both in zip(rows, parts[n + IMAGINARY], strict=True)]
+        if n + IMAGINARY in parts
+        else rows
+        for n, rows in parts.items()
+        if not n.endswith(IMAGINARY)
+    }
+
+
+def sort_places(is_complex: bool, places: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Sort places, each a key and a position, in the user's order: the two parts of an entry stay together."""
+    listed = list(places)
+    if not is_complex:
+        return listed
+    keys = list(dict.fromkeys(user_key(key) for key, _ in listed))
+    return sorted(listed, key=lambda place: (keys.index(user_key(place[0])), place[1]))
 
 
 def polynomial(kind: str, blocks: dict[str, Matrix], carrier: float = 0.0) -> list[Any]:
@@ -38,30 +49,26 @@ def polynomial(kind: str, blocks: dict[str, Matrix], carrier: float = 0.0) -> li
     if kind == "coefficients":
         return blocks["coefficients"][0]
     if kind == "hamiltonian":
-        return _real_polynomial(blocks["H"], blocks[IMAGINARY_KEY], carrier)
+        return _real_polynomial(blocks["H"], carrier)
     if "A" in blocks:
         return characteristic_polynomial(blocks["A"])
     return quadratic_pencil(*pencil(blocks))
 
 
-def _real_polynomial(R: Matrix, J: Matrix, carrier: float) -> list[Any]:
+def _real_polynomial(H: Matrix, carrier: float) -> list[Any]:
     """|det(s + i (H + carrier))|² for real s; its roots are −i (ω + carrier) and their conjugates."""
-    rows, S = range(len(R)), _add_carrier(R, carrier)
-    coefficients = [pair(x) for x in characteristic_polynomial([[Pair(J[i][j], -S[i][j]) for j in rows] for i in rows])]
+    rows = [[Pair(x.im, -x.re - Fraction(carrier) * (i == j)) for j, x in enumerate(row)] for i, row in enumerate(H)]
+    coefficients = [pair(x) for x in characteristic_polynomial(rows)]
     re, im = [x.re for x in coefficients], [x.im for x in coefficients]
     return [a + b for a, b in zip(product(re, re), product(im, im), strict=True)]
 
 
-def _add_carrier(R: Matrix, carrier: float) -> Matrix:
-    """The real part of H plus the carrier."""
-    return [[x + Fraction(carrier) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(R)]
-
-
 def pencil(blocks: dict[str, Matrix]) -> Matrices:
     """Matrices of the matrix polynomial, for descending powers; for H they are I and i H, with pairs as entries."""
+    if "coefficients" in blocks:
+        return tuple([[x]] for x in blocks["coefficients"][0])
     if "H" in blocks:
-        parts = zip(blocks["H"], blocks[IMAGINARY_KEY], strict=True)
-        A: Matrix = [[Pair(y, -x) for x, y in zip(*rows, strict=True)] for rows in parts]
+        A: Matrix = [[Pair(x.im, -x.re) for x in row] for row in blocks["H"]]
     elif "A" in blocks:
         A = blocks["A"]
     else:

@@ -97,6 +97,11 @@ def join(re: Any, im: Any) -> Any:
     return re + 1j * im
 
 
+def is_complex_entry(x: Any) -> bool:
+    """Whether an entry as the user wrote it is complex: a number, a pair, or a text with 1j."""
+    return isinstance(x, complex | np.complexfloating | tuple) or (isinstance(x, str) and replace_literals(x) != x)
+
+
 def is_real(x: Pair) -> bool:
     """True if the imaginary part of a pair is 0 for all parameters."""
     return constant(x.im).fraction == 0

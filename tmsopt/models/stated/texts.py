@@ -12,7 +12,15 @@ from tmsopt.models.expression import Expression, ExpressionError, parse_value
 from tmsopt.models.model import Matrix
 from tmsopt.models.names import name_fault
 from tmsopt.models.stated.degree import DEGREES, Degree, DegreeTooHigh
-from tmsopt.models.stated.pairs import IMAGINARY_UNIT, PAIRS, entry_pair, pair, replace_literals, restore_literals
+from tmsopt.models.stated.pairs import (
+    IMAGINARY_UNIT,
+    PAIRS,
+    entry_pair,
+    is_complex_entry,
+    pair,
+    replace_literals,
+    restore_literals,
+)
 from tmsopt.records import Table
 
 MAX_QUANTITIES = 500
@@ -142,12 +150,17 @@ def describe_position(key: str, i: int, j: int) -> str:
     return f"entry {j}" if key == "coefficients" else f"row {i}, column {j}"
 
 
+def are_complex(matrices: Mapping[str, Matrix]) -> bool:
+    """Whether matrices are those of a complex system: H, or others with a complex entry."""
+    return "H" in matrices or any(is_complex_entry(x) for rows in matrices.values() for row in rows for x in row)
+
+
 def parse_entries(
     matrices: Mapping[str, Matrix], quantities: Mapping[Any, Any], fault: Callable[..., None]
 ) -> tuple[dict[str, Matrix], dict[Any, Any]]:
-    """Matrices and quantities with nodes instead of texts; each entry of a complex H becomes a pair (re, im)."""
+    """Matrices and quantities with nodes instead of texts; each entry of complex matrices becomes a pair (re, im)."""
     texts_by_name = {n: x for n, x in quantities.items() if isinstance(x, str)}
-    given_nodes, of_H = {n: x for n, x in quantities.items() if n not in texts_by_name}, "H" in matrices
+    given_nodes, of_H = {n: x for n, x in quantities.items() if n not in texts_by_name}, are_complex(matrices)
     texts = Texts(fault, dict(given_nodes))
     if of_H:
         texts = Texts(

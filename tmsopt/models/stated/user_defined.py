@@ -33,10 +33,10 @@ from tmsopt.models.model import Matrices, Matrix, Model, Parameter, ParameterSet
 from tmsopt.models.names import latex, name_fault, number_text, spell_formula
 from tmsopt.models.stated.closed_loop import LOOP_KEYS, check_loop, close_loop
 from tmsopt.models.stated.degree import first_fault
-from tmsopt.models.stated.equations import IMAGINARY_KEY, pencil, polynomial, sort_places, user_key
+from tmsopt.models.stated.equations import IMAGINARY, join_parts, pencil, polynomial, sort_places, user_key
 from tmsopt.models.stated.pairs import Pair, complex_text, join
 from tmsopt.models.stated.real_form import ABSENT, CONVENTIONS, WORDS, complex_model, frequency_bounds
-from tmsopt.models.stated.texts import Unfit, describe_position, parse_entries
+from tmsopt.models.stated.texts import Unfit, are_complex, describe_position, parse_entries
 from tmsopt.records import AnyNumbers
 
 _ACCEPTED_ENTRIES = "accepted: finite numbers, expressions in quotes, and SX expressions"
@@ -186,7 +186,7 @@ def _read_matrix(key: str, value: Any) -> Matrix:
 
 def _build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: Any) -> Model:
     """The model of a system. Two equal systems give the same object."""
-    key, of_H = next(iter(matrices)), kind == "hamiltonian"
+    key, of_H = next(iter(matrices)), are_complex(matrices)
     if not isinstance(name, str) or not name.strip() or not name.isprintable():
         raise Unfit("name", f"found {name!r}; accepted: a text of one line")
     if name.strip() in MODELS:
@@ -197,8 +197,11 @@ def _build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: 
         matrices, {n: _read_node("quantities", n, x) for n, x in (quantities or {}).items()}, _unfit
     )
     if of_H:
-        H = matrices["H"]
-        matrices = {"H": [[x.re for x in row] for row in H], IMAGINARY_KEY: [[x.im for x in row] for row in H]}
+        matrices = {
+            key: [[getattr(x, part) for x in row] for row in rows]
+            for n, rows in matrices.items()
+            for key, part in ((n, "re"), (n + IMAGINARY, "im"))
+        }
     entry_by_position = {
         (n, describe_position(n, i, j)): x
         for n, rows in matrices.items()
@@ -208,7 +211,7 @@ def _build_model(kind: str, name: Any, matrices: dict[str, Matrix], quantities: 
     inputs = ca.symvar(ca.vertcat(ca.SX(0, 1), *(x for x in entry_by_position.values() if isinstance(x, ca.SX))))
     symbols = Counter(x.name() for x in inputs)
     entries = {position: _read_node(user_key(position[0]), position[1], x) for position, x in entry_by_position.items()}
-    names = formula(entries[position] for position in sort_places(kind, entries)).names
+    names = formula(entries[position] for position in sort_places(of_H, entries)).names
     if duplicates := [n for n, count in symbols.items() if count > 1]:
         raise Unfit(key, f"has two symbols named {min(duplicates)}; make one and use it everywhere")
     if not names:
@@ -246,10 +249,12 @@ def _build_from_data(
     names = entry_formula.names
     entries = fold(entry_formula, {n: symbol(n) for n in names}, NODES)
     remaining_entries = iter(entries)
-    blocks = close_loop(_split(remaining_entries, shapes))
-    matrices = None if kind == "coefficients" else pencil(blocks)
+    blocks = close_loop(join_parts(_split(remaining_entries, shapes)))
+    is_complex = any(n.endswith(IMAGINARY) for n, *_ in shapes)
+    matrices = None if kind == "coefficients" and not is_complex else pencil(blocks)
     coefficients, degree = None, (len(matrices) - 1) * len(matrices[0]) if matrices else 0
-    if matrices is None or len(matrices[0]) <= _MAX_POLYNOMIAL_SIZE[shapes[0][0]]:
+    is_small = matrices is None or len(matrices[0]) <= _MAX_POLYNOMIAL_SIZE.get(shapes[0][0], 0)
+    if is_small and (kind == "hamiltonian" or not is_complex):
         coefficients = _find_polynomial(kind, shapes[0][0], blocks, names, carrier)
         degree = len(coefficients.outputs) - 1
     quantities = zip(quantity_names, remaining_entries, strict=True)
@@ -268,7 +273,7 @@ def _build_from_data(
         statement=_statement(entry_formula, shapes, quantity_names),
         numbers=tuple(number_text(x) for x in entry_formula.constants if getattr(x, "denominator", 0) != 1),
     )
-    if kind != "hamiltonian":
+    if not is_complex:
         return model
     if coefficients is None:
         return replace(model, is_complex=True, words=WORDS, absent=ABSENT, conventions=CONVENTIONS)
@@ -329,9 +334,9 @@ def _statement(entry_formula: Formula, shapes: tuple[_Shape, ...], quantity_name
     texts, long_parts = spell_formula(entry_formula)
     remaining_texts = iter(texts)
     matrices, quantities = _split(remaining_texts, shapes), dict(zip(quantity_names, remaining_texts, strict=True))
-    if IMAGINARY_KEY in matrices:
-        rows = zip(matrices["H"], matrices.pop(IMAGINARY_KEY), strict=True)
-        matrices["H"] = [list(map(complex_text, *row)) for row in rows]
+    for n in [n for n in matrices if n + IMAGINARY in matrices]:
+        rows = zip(matrices[n], matrices.pop(n + IMAGINARY), strict=True)
+        matrices[n] = [list(map(complex_text, *row)) for row in rows]
     return {"parameters": list(entry_formula.names), **matrices, "quantities": quantities, "shared": long_parts}
 
 
