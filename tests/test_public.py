@@ -28,6 +28,7 @@ ASKED = {
     "explain": lambda given: tmsopt.explain(given).summary,
     "optimality": lambda given: tmsopt.optimality(given).verdict,
     "diagnose": tmsopt.diagnose,
+    "eigenvalues": tmsopt.eigenvalues,
     "growth": lambda given: tmsopt.growth(given).stable,
     "simulate": lambda given: tmsopt.simulate(given, lean=5).columns,
 }

@@ -99,14 +99,13 @@ RESULTS = {
     "Robustness": lambda: tmsopt.robustness(design()),
     "Nearest": lambda: tmsopt.nearest(design(), "weave"),
     "Diagnosis": lambda: tmsopt.diagnose(design())[0],
+    "Eigenvalues": lambda: tmsopt.eigenvalues(design()),
     "Domain": lambda: charted().domain,
     "Swallowtail": lambda: tmsopt.swallowtail(tailed(), rows=4, across=3, starts=4),
     "Ledger": lambda: tmsopt.verify(only=["lscf-*"]),
     "Description": lambda: tmsopt.describe(plane()),
 }
-TITLED = (
-    "Solution Front Trace Chart Speeds Simulation Comparison Results Proof Swallowtail Every Robustness Description"
-)
+TITLED = "Eigenvalues Solution Front Trace Chart Speeds Simulation Comparison Results Proof Swallowtail Every Robustness Description"
 made = cache(lambda name: RESULTS[name]())
 each = pytest.mark.parametrize("name", RESULTS)
 
@@ -166,7 +165,7 @@ def test_its_text_is_its_report(name):
 @pytest.mark.slow
 def test_it_is_drawn_into_axes(name):
     result = made(name)
-    if name in ("Branch", "Description"):
+    if name in ("Branch", "Description", "Eigenvalues"):
         with pytest.raises(tmsopt.InputError, match=f"no picture of a {name} alone"):
             result.plot()
         return

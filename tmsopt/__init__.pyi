@@ -7,7 +7,9 @@ from .problem import (
     Band as Band, Bound as Bound, Case as Case, NotSolved as NotSolved, Problem as Problem, Solution as Solution,
     Starts as Starts, load as load,
 )
-from .analysis import Diagnosis as Diagnosis, diagnose as diagnose
+from .analysis import (
+    Diagnosis as Diagnosis, Eigenvalues as Eigenvalues, diagnose as diagnose, eigenvalues as eigenvalues,
+)
 from .documents import save_report as save_report
 from .errors import Fault as Fault, InputError as InputError
 from .analysis import (

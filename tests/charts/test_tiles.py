@@ -25,7 +25,7 @@ def whole(tmp_path_factory):
 @pytest.mark.parametrize(("tile", "workers"), [(1, 1), (97, 2), (10**6, 1)])
 def test_tiles_are_the_chart_in_memory_to_the_bit(tile, workers, whole, tmp_path):
     found = charted(tmp_path / "cut.chart", tile=tile, workers=workers)
-    small = chart(PLANE, points=POINTS, quantities=EXTRA, boundaries=False)
+    small = chart(PLANE, points=POINTS, layers=tuple(LAYERS), quantities=EXTRA, boundaries=False)
     assert list(found.layers) == list(small.layers)
     for name, wanted in small.layers.items():
         assert found.layers[name].shape == (23, 37)

@@ -1,5 +1,6 @@
 """The command line by its contract: streams, exit status, JSON, figures; in a process of its own where that matters."""
 
+import csv
 import io
 import json
 import math
@@ -150,17 +151,38 @@ def test_diagnose_says_how_each_multiple_root_splits(run):
     assert (status, err, data["schema"], data["status"]) == (0, "", 1, "optimal")
     (root,) = data["diagnoses"]
     assert (root["algebraic"], root["geometric"]) == (4, 1)
+    (eigenvalue,) = data["eigenvalues"]
+    assert eigenvalue["multiplicity"] == 4
+    for entry in (root, eigenvalue):  # infinite numbers are null
+        assert (entry["phase_rigidity"], entry["petermann"], entry["condition"]) == (0, None, None)
     status, out, _ = run("diagnose", "problems/ep4.toml")
     assert (status, "4" in out) == (0, True)
 
 
 def test_diagnose_of_simple_roots_says_so(run, tmp_path):
     words = "diagnose", "problems/whipple_benchmark.toml"
-    assert json.loads(run(*words, "--json")[1])["diagnoses"] == []
+    data = json.loads(run(*words, "--json")[1])
+    assert data["diagnoses"] == []
+    assert [s["multiplicity"] for s in data["eigenvalues"]] == [1, 1, 1, 1]
+    assert all(s["petermann"] == pytest.approx(s["phase_rigidity"] ** -2, rel=1e-8) for s in data["eigenvalues"])
     status, out, err = run(*words, "--plot", tmp_path / "none.png")
-    assert (status, len(out.splitlines()), len(err.splitlines())) == (0, 1, 1)
-    assert "no root of this solution is multiple" in out
+    assert (status, len(err.splitlines())) == (0, 1)
+    assert "no root is multiple" in out
+    assert "Petermann factor" in out
     assert list(tmp_path.iterdir()) == []
+
+
+def test_diagnose_over_a_parameter_writes_petermann_factors(run, tmp_path):
+    words, table, figure = ("diagnose", "problems/loss_only_dimer.toml"), tmp_path / "k.csv", tmp_path / "k.png"
+    status, _, err = run(*words, "--over", "k", "--csv", table, "--plot", figure)
+    assert (status, err) == (0, f"wrote {table}\nwrote {figure}\n")
+    with table.open(encoding="utf-8", newline="") as stream:
+        rows = [{name: float(x) for name, x in row.items()} for row in csv.DictReader(stream)]
+    data = json.loads(run(*words, "--over", "k", "--json")[1])["over"]
+    assert [[row["petermann_1"], row["petermann_2"]] for row in rows] == data["petermann"]
+    status, out, err = run(*words, "--csv", table)
+    assert (status, out) == (2, "")
+    assert "--csv: writes Petermann factors" in err
 
 
 @pytest.mark.parametrize("ending", ["png", *(pytest.param(e, marks=pytest.mark.slow) for e in ("pdf", "svg"))])

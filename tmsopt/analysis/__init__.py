@@ -1,7 +1,7 @@
 """Analysis of a solution: local optimality, the value of limits, the effect of rounding, splitting of multiple roots.
 
-Input: a solution. Output: an `Explanation`, and a `Diagnosis` of each multiple root, as data that `tmsopt.documents`
-shows. Open `explain` first, then `diagnosis`.
+Input: a solution. Output: an `Explanation`, a `Diagnosis` of each multiple root, and the sensitivity of all
+`Eigenvalues`, as data that `tmsopt.documents` shows. Open `explain` first, then `diagnosis`.
 """
 
 import lazy_loader

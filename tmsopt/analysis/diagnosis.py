@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from tmsopt.analysis.root_point import RootPoint, evaluate_pencil, high_precision, midpoint, refine_point, refine_root
+from tmsopt.analysis.sensitivity import measure_sensitivity, sensitivity_to_json
 from tmsopt.analysis.splitting import DEVIATION, Law, Response, compute_response
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
+from tmsopt.problem.evaluate import evaluate_matrices
 from tmsopt.problem.files import ProblemSource
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Numbers, Printable, plain
@@ -37,6 +39,7 @@ class Diagnosis(Printable):
         distance: relative change of the coefficients from the design to the nearest polynomial with the structure.
         responses: one response for each parameter; the parameter that moves the root most comes first.
         eigenfrequency: ω = i s for a complex system, otherwise None.
+        phase_rigidity, petermann, condition: the sensitivity, as in `Eigenvalues`: 0 and infinite unless semisimple.
 
     Example:
         >>> (found,) = tmsopt.diagnose("problems/ep4.toml")
@@ -56,6 +59,9 @@ class Diagnosis(Printable):
     distance: float
     responses: tuple[Response, ...]
     eigenfrequency: complex | None = None
+    phase_rigidity: float = 0.0
+    petermann: float = math.inf
+    condition: float = math.inf
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; descriptive numbers have 6 digits."""
@@ -63,6 +69,7 @@ class Diagnosis(Printable):
             **plain(self, "re im"),
             **(plain(self, "eigenfrequency") if self.eigenfrequency is not None else {}),
             **plain(self, "algebraic geometric partial kind"),
+            **sensitivity_to_json(self),
             "matrices": self.jordan is not None,
             **({"singular_values": plain(self.jordan, "zero nonzero threshold", digits=6)} if self.jordan else {}),
             **plain(self, "distance", digits=6),
@@ -121,6 +128,7 @@ def diagnose_roots(
     Args:
         free: ranges of free parameters. A value that is tiny compared with its range may be a rounded 0.
     """
+    matrices = evaluate_matrices(model, parameter_set, design).astype(complex)
     range_widths, diagnoses = {n: b - a for n, (a, b) in (free or {}).items()}, []
     if model.polynomial is None:
         return ()
@@ -155,9 +163,12 @@ def diagnose_roots(
                 sorted((compute_response(point, name) for name in parameter_set.names), key=_rank_response)
             )
             s = midpoint(point.s)
-            omega = (complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, k)]))
-            distance = structure.distance
-            diagnoses.append(Diagnosis(s.real, s.imag, k, g, partial, kind, chains, distance, responses, *omega))
+            omega = next((complex(z.re, z.im) for z in eigenfrequencies(model, [Root(s.real, s.imag, k)])), None)
+            sensitivity = measure_sensitivity(matrices, s, k, kind != "semisimple")
+            diagnosis = Diagnosis(
+                s.real, s.imag, k, g, partial, kind, chains, structure.distance, responses, omega, **sensitivity
+            )
+            diagnoses.append(diagnosis)
     return tuple(diagnoses)
 
 

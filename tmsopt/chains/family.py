@@ -11,7 +11,7 @@ import numpy as np
 from tmsopt.algebra.formula import Formula, fold, formula, symbol
 from tmsopt.algebra.kinds import CASADI
 from tmsopt.algebra.sequence import golden_steps
-from tmsopt.models.stated.pairs import Pair
+from tmsopt.models.stated.pairs import list_parts
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array, Complex, Numbers, Table
 from tmsopt.roots.chains import eigenvalues_of
@@ -77,10 +77,9 @@ def _build_family(problem: Posed, fixed: tuple[float, ...]) -> Family:
     constants = problem.as_nodes(dict(zip(problem.fixed, fixed, strict=True)))
     parameters = problem.ordered({**constants, **{n: symbol(n) for n in problem.free}})
     matrices = problem.model.pencil(problem.parameter_set.native(parameters))
-    parts = [y for P in matrices for row in P for x in row for y in ((x.re, x.im) if isinstance(x, Pair) else (x, 0))]
     names, box = tuple(problem.free), np.array([*problem.free.values()], dtype=float).reshape(-1, 2)
-    n = len(matrices[0])
-    return Family(names, box, problem.model.is_complex, _compile(formula(parts, names), (len(matrices), n, n)))
+    parts, n = formula(list_parts(matrices), names), len(matrices[0])
+    return Family(names, box, problem.model.is_complex, _compile(parts, (len(matrices), n, n)))
 
 
 def _compile(parts: Formula, shape: tuple[int, ...]) -> Callable[[Array], tuple[Complex, Complex]]:

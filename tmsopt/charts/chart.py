@@ -16,6 +16,7 @@ from tmsopt.charts.folder import SCHEMA, Tiles, grid_of, read_folder, write_fold
 from tmsopt.charts.survey import (
     DEFAULT_LAYERS,
     LAYERS,
+    MEMORY_LAYERS,
     Grid,
     Survey,
     Tally,
@@ -98,6 +99,11 @@ class Chart(Printable):
         "margin",
         "Smallest difference between the sides of an inequality, negative if one is violated; nan if undefined.",
     )
+
+    petermann = _layer_property(
+        "petermann", "Largest Petermann factor of an eigenvalue (`tmsopt.roots.find_conditioning`); nan if undefined."
+    )
+    phase_rigidity = _layer_property("phase_rigidity", "Smallest phase rigidity of an eigenvalue; nan if undefined.")
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -210,7 +216,8 @@ def chart(
         folder: folder for the arrays, e.g. ``big.chart``, for up to 1e9 designs; by default they are in memory, for
             up to 2e7.
         points: numbers of points along the axes, by default 400x300 or 120x100x80; the ends of the box are grid points.
-        layers: names from `tmsopt.charts.LAYERS`; by default all, and in a folder all except the margin.
+        layers: names from `tmsopt.charts.LAYERS`; by default all except ``petermann`` and
+            ``phase_rigidity``, and in a folder not ``margin`` either.
         quantities: name → expression of an additional layer.
         single: store numbers in single precision.
         workers: number of processes; with 1, no further process is started.
@@ -236,7 +243,7 @@ def chart(
     if faults := faults + callback_faults("progress", progress):
         raise InputError(faults)
     steps = start_steps(progress, "charting", "design") or (lambda *_: None)
-    layer_names = layers if layers is not None else tuple(LAYERS) if folder is None else DEFAULT_LAYERS
+    layer_names = layers if layers is not None else MEMORY_LAYERS if folder is None else DEFAULT_LAYERS
     survey = plan_survey(problem, axes, points, layer_names, quantities, single)
     path, grid, about = None if folder is None else as_path(folder, "a folder"), survey.grid, _describe(survey, tile)
     if path is None and grid.size > MAX_DESIGNS_IN_MEMORY:

@@ -16,7 +16,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.errors import Fault, InputError, input_error, list_faults, short, suggest, table_faults
 from tmsopt.problem.advice.names import example_of
-from tmsopt.problem.evaluate import ArrayFunction, array_function, parse_all
+from tmsopt.problem.evaluate import ArrayFunction, array_function, find_eigenvalues, parse_all
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_NAMES
@@ -30,11 +30,19 @@ LAYERS: Mapping[str, DTypeLike] = {
     "real_roots": np.int8,
     "satisfied": np.bool_,
     "margin": np.float64,
+    "petermann": np.float64,
+    "phase_rigidity": np.float64,
 }
 """Layers that a chart can have → their types; `Chart` explains them."""
 
-DEFAULT_LAYERS = tuple(LAYERS)[:-1]
+MEMORY_LAYERS = tuple(LAYERS)[:-2]
+"""Default layers of a chart in memory."""
+
+DEFAULT_LAYERS = MEMORY_LAYERS[:-1]
 """Default layers of a chart that is written to a folder."""
+
+_ROOT_LAYERS = {"kind", "abscissa", "damping_ratio", "real_roots"}  # layers that need the coefficients
+_EIGENVECTOR_LAYERS = {"petermann", "phase_rigidity"}  # layers that need the matrices
 
 DEFAULT_POINTS: Mapping[int, tuple[int, ...]] = {2: (400, 300), 3: (120, 100, 80)}
 """Number of axes → default numbers of points along them."""
@@ -152,7 +160,7 @@ class Survey:
         columns, model = {**self.problem.fixed, **self.grid.columns(rows)}, self.problem.model
         with np.errstate(all="ignore"):  # overflow counts as undefined
             values = self.formulas(columns)
-            coefficients = [np.broadcast_to(values[n], shape) for n in model.coefficient_names()]
+            coefficients = [np.broadcast_to(values[n], shape) for n in model.coefficient_names() if n in values]
             if {"kind", "real_roots"} & layers:
                 values |= vars(classify(coefficients))
             if self.root_formulas.names or {"abscissa", "damping_ratio"} & layers:
@@ -161,6 +169,10 @@ class Survey:
                 ratio = motion.damping_ratio if not model.is_complex else np.full(shape, np.nan)
                 root_quantities = {"abscissa": motion.abscissa, "damping_ratio": ratio}
                 values |= root_quantities | self.root_formulas(columns | root_quantities)
+            if _EIGENVECTOR_LAYERS & layers:
+                eigenvalues = find_eigenvalues(model, self.problem.parameter_set, columns)
+                values["petermann"] = np.fmax.reduce(eigenvalues.petermann, axis=-1)
+                values["phase_rigidity"] = np.fmin.reduce(eigenvalues.phase_rigidity, axis=-1)
             if {"satisfied", "margin"} & layers:
                 margins = [-c.sign * values[_LIMIT + n] for n, c in limits_of(self.problem).items()]
                 values["margin"] = reduce(np.minimum, margins, np.inf)
@@ -219,8 +231,9 @@ def plan_survey(
         raise InputError(faults)
     if {"satisfied", "margin"} & set(layers):
         expressions |= {_LIMIT + n: c for n, c in limits_of(problem).items()}
-    expressions |= parse_all(problem, {n: n for n in problem.model.coefficient_names()})
     root_expressions = {n: e for n, e in expressions.items() if set(ROOT_NAMES) & set(e.names)}
+    if root_expressions or _ROOT_LAYERS & set(layers):
+        expressions |= parse_all(problem, {n: n for n in problem.model.coefficient_names()})
     types = {n: np.dtype(LAYERS.get(n, np.float64)) for n in (*layers, *user_layers)}
     return Survey(
         problem,

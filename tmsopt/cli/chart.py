@@ -18,6 +18,8 @@ from tmsopt.deprecated import no_longer_needed
 from tmsopt.errors import input_error, suggest
 
 _LAYERS = ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied", "margin")
+_EIGENVECTOR_LAYERS = ("petermann", "phase_rigidity")
+"""Layers that are computed only if an option names them."""
 _MAX_FIGURE_POINTS = (800, 600)
 """Largest number of points along the axes of a figure of a large chart."""
 
@@ -77,6 +79,7 @@ class ChartCommand(WithPage, WithPlot, OnFile):
         if self.output is not None and self.output.suffix.lower() == ".nc":
             check_netcdf()
         problem = take_nominal(tmsopt.load(self.file).posed)
+        figure_layers = (*_LAYERS, *(n for n in _EIGENVECTOR_LAYERS if n == self.layer))
         names, layers = axes_of(problem, self.axes), self.layers or DEFAULT_LAYERS
         is_plane_in_memory = folder is None and len(names) == 2  # such a chart has all layers and boundaries
         self._check_plot(len(names))
@@ -88,7 +91,7 @@ class ChartCommand(WithPage, WithPlot, OnFile):
                 names,
                 folder=folder,
                 points=self.points * len(names) if self.points and len(self.points) == 1 else self.points,
-                layers=(*_LAYERS, *layers) if is_plane_in_memory else layers,
+                layers=(*figure_layers, *layers) if is_plane_in_memory else layers,
                 workers=self.workers,
                 fresh=self.fresh,
                 boundaries=self.boundaries and is_plane_in_memory,
@@ -98,7 +101,7 @@ class ChartCommand(WithPage, WithPlot, OnFile):
             write_file("--output", self.output, lambda path: chart.save(path, (*dict.fromkeys(layers), *self.quantity)))
 
         def draw() -> Any:
-            figure_options = options | {"boundaries": self.boundaries}
+            figure_options = options | {"boundaries": self.boundaries, "layers": figure_layers}
             figure_chart = (
                 chart if is_plane_in_memory else tmsopt.chart(**_cut_plane(chart, slice_values), **figure_options)
             )
@@ -107,7 +110,7 @@ class ChartCommand(WithPage, WithPlot, OnFile):
         return Reply(chart, draw=draw)
 
     def _check_plot(self, axis_count: int) -> None:
-        accepted = (*_LAYERS[:4], *self.quantity)
+        accepted = (*_LAYERS[:4], *_EIGENVECTOR_LAYERS, *self.quantity)
         if self.layer not in accepted:
             raise input_error(f"found '{self.layer}'; {suggest(self.layer, accepted)}", "--layer")
         if self.plot is not None and axis_count == 3 and not self.slice:

@@ -229,26 +229,38 @@ class ProveCommand(WithSearch, WithPage, WithPlot, OnFile):
         return Reply(proof, status, data, page={"design": solution})
 
 
-class DiagnoseCommand(WithSearch, WithPlot, OnFile):
-    """Show how each multiple root of the solution of FILE splits, and how fast.
+class DiagnoseCommand(WithSearch, WithCsv, WithPlot, OnFile):
+    """Show how each multiple root of the solution of FILE splits, and how
+    sensitive all eigenvalues are.
 
     Examples:
       tmsopt diagnose problems/ep4.toml
       tmsopt diagnose problems/pt_pair.toml --plot splitting.png
+      tmsopt diagnose problems/pt_trimer.toml --over gain --plot petermann.png
 
     Exit status: 0 done, 2 bad input, 3 infeasible, 4 not converged.
     """
 
+    over: str | None = option("Show roots and Petermann factors over a parameter.", metavar="NAME")
+
     def run(self) -> Reply:
+        self.refuse_useless((not self.over, "csv", "writes Petermann factors over a parameter; add --over NAME"))
         solution = tmsopt.solve(self.file, **self.search)
         diagnoses = tmsopt.diagnose(solution, progress=progress_listener())
+        eigenvalues = tmsopt.eigenvalues(solution)
         data = {"status": solution.status, "diagnoses": [diagnosis.to_json() for diagnosis in diagnoses]}
-        data = solution.problem.posed.heading | data
-        if diagnoses:
-            return Reply(diagnoses[0], 0, data, "full", content=diagnoses)
-        if self.plot:
-            click.echo("--plot: nothing to draw, no root is multiple", err=True)
-        return Reply("no root of this solution is multiple, so none splits", 0, data, skipped_options="plot")
+        data = solution.problem.posed.heading | data | eigenvalues.to_json()
+        is_multiple = any(s.multiplicity > 1 for s in eigenvalues.entries)
+        reason = "the matrices are too large to show how a root splits" if is_multiple else "no root is multiple"
+        content = [*(diagnoses or [reason]), eigenvalues]
+        if self.over:
+            growth = tmsopt.growth(solution, over=self.over, petermann=True, progress=progress_listener())
+            draw = partial(tmsopt.plots.growth_figure, growth)
+            return Reply(growth, 0, data | {"over": growth.to_json()}, "full", draw, content=[*content, growth])
+        if self.plot and not diagnoses:
+            click.echo(f"--plot: nothing to draw, {reason}", err=True)
+        result, skipped_options = (diagnoses[0], "") if diagnoses else (eigenvalues, "plot")
+        return Reply(result, 0, data, "full", content=content, skipped_options=skipped_options)
 
 
 def _parse_range(text: str) -> tuple[float, float]:

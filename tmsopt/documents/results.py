@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _RESULTS = {
     "solution": {"Solution": "draw_growth"},
     "explanation": {"Explanation": "draw_rounding", "Optimality": "draw_roots", "Diagnosis": "draw_splitting"},
+    "sensitivity": {"Eigenvalues": ""},
     "robustness": {"Robustness": "draw_robustness", "Nearest": "draw_robustness"},
     "motion": {"Speeds": "draw_speeds", "Growth": "draw_growth", "Simulation": "draw_motion"},
     "curves": {

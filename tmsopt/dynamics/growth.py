@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,15 @@ from tmsopt.dynamics.modes import Mode, follow_modes
 from tmsopt.dynamics.speeds import coefficients_over, speed_of
 from tmsopt.dynamics.system import is_bicycle
 from tmsopt.errors import InputError, input_error, is_number, short, suggest
-from tmsopt.models import Parameter, ParameterSet, Values
+from tmsopt.files import write_csv
+from tmsopt.models import Model, Parameter, ParameterSet, Values
 from tmsopt.models.user_spectrum import user_root_array
+from tmsopt.problem.evaluate import find_eigenvalues
 from tmsopt.problem.files import ProblemSource
 from tmsopt.problem.problem import Problem
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
-from tmsopt.records import Array, Tabular, Truth, plain
+from tmsopt.records import AnyNumbers, Array, Complex, Tabular, Truth, plain
 from tmsopt.roots import Root, is_stable, roots
 from tmsopt.search.solve import solve_if_needed
 
@@ -57,6 +60,8 @@ class Growth(Tabular):
             only changes of stability are listed.
         rate: the unit of rates in 1/s, for each value; None without a unit of time.
         multiple: multiple roots of the design. Double precision gives them to half of its digits at most.
+        petermann: Petermann factor of each root (`tmsopt.roots.find_conditioning`), in the shape of `roots`; None if
+            not requested.
 
     Example:
         >>> bands = tmsopt.growth("problems/whipple_benchmark.toml").stable
@@ -79,23 +84,41 @@ class Growth(Tabular):
     events: tuple[Crossing, ...] = ()
     rate: Array | None = None
     multiple: tuple[Root, ...] = ()
+    petermann: Array | None = None
 
     def records(self) -> Iterable[dict[str, Any]]:
-        """The roots, one row for each value of the parameter."""
+        """The roots and, if requested, their Petermann factors, one row for each value of the parameter."""
         names = [f"{part}_{k}" for k in range(1, self.roots.shape[1] + 1) for part in ("re", "im")]
         parts = np.stack([self.roots.real, self.roots.imag], axis=-1).reshape(len(self.values), -1)
+        if self.petermann is not None:
+            names += [f"petermann_{k}" for k in range(1, self.roots.shape[1] + 1)]
+            parts = np.concatenate([parts, self.petermann], axis=1)
         for value, row in zip(self.values.tolist(), parts.tolist(), strict=True):
             yield {self.over.name: value, **dict(zip(names, row, strict=True))}
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; numbers that do not exist are None."""
+        names = "critical design structure stable heavily_damped values roots"
         return {"parameter": self.over.name, "unit": self.over.unit} | plain(
-            self, "critical design structure stable heavily_damped values roots"
+            self, names if self.petermann is None else f"{names} petermann"
         )
+
+    def write_csv(self, path: str | PathLike[str]) -> None:
+        """Write the records as a CSV table; its header has names and units.
+
+        Raises:
+            OSError: if the file cannot be written.
+        """
+        write_csv(path, list(self.records()), {self.over.name: self.over.unit})
 
 
 def growth(
-    design: ProblemSource, end: float | None = None, over: str | None = None, *, progress: Listener | None = None
+    design: ProblemSource,
+    end: float | None = None,
+    over: str | None = None,
+    *,
+    petermann: bool = False,
+    progress: Listener | None = None,
 ) -> Growth:
     """Roots over one parameter; all other parameters are those of the design.
 
@@ -108,6 +131,7 @@ def growth(
             out. The default for another parameter is its range if it is free, otherwise twice the design's value.
         over: a parameter of the problem, or a native parameter of the model. The default is the speed, or without a
             speed the first free parameter.
+        petermann: whether to compute the Petermann factor of each root.
         progress: called with a `tmsopt.Progress` now and then.
 
     Raises:
@@ -207,7 +231,15 @@ def growth(
         events,
         rate,
         tuple(r for r in design.roots if r.multiplicity > 1),
+        _find_petermann(model, parameter_set, {**parameters, name: values}, root_values) if petermann else None,
     )
+
+
+def _find_petermann(model: Model, parameter_set: ParameterSet, columns: AnyNumbers, roots: Complex) -> Array:
+    """The Petermann factor of the eigenvalue nearest to each root."""
+    found = find_eigenvalues(model, parameter_set, columns)
+    nearest = np.abs(found.eigenvalues[:, None, :] - roots[:, :, None]).argmin(axis=-1)
+    return np.take_along_axis(found.petermann, nearest, axis=-1)
 
 
 def _find_parameter(design: Solution, over: str | None) -> tuple[ParameterSet, dict[str, float], str]:

@@ -3,7 +3,7 @@ from .chart import chart_figure as chart_figure, draw_chart as draw_chart, draw_
 from .front import draw_front as draw_front, front_figure as front_figure
 from .growth import (
     draw_frequencies as draw_frequencies, draw_growth as draw_growth, draw_speeds as draw_speeds,
-    growth_figure as growth_figure,
+    draw_petermann as draw_petermann, growth_figure as growth_figure,
 )
 from .labels import Name as Name, place_names as place_names
 from .meaning import (

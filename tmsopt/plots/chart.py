@@ -8,7 +8,7 @@ from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -45,13 +45,23 @@ _BOUNDARY_STYLES = (
 _COLOUR_PERCENTILES = (1, 95)
 """The colours cover a layer between these percentiles, so that poles of the abscissa do not use up all colours."""
 
+_EXTREME_PERCENTILES = (0.1, 99.9)
+"""The same for layers whose extremes are exceptional points, which are narrow."""
+
+_MIN_PETERMANN_RANGE = 10.0  # least ratio of the largest and the smallest Petermann factor on the colour scale
+
 _ARC_STYLES: Mapping[str, tuple[LineStyleType, str]] = {
     "capsize": ("-.", " (root 0)"),
     "infinity": (":", " (root at infinity)"),
 }
 """Kind of a boundary curve → line style and addition to its label; other kinds have a solid line."""
 
-_LAYER_LABELS = {"damping_ratio": "damping ratio", "real_roots": "number of real roots"}
+_LAYER_LABELS = {
+    "damping_ratio": "damping ratio",
+    "real_roots": "number of real roots",
+    "petermann": "largest Petermann factor",
+    "phase_rigidity": "smallest phase rigidity",
+}
 """Labels of layers of numbers; a quantity is labelled with its name."""
 
 
@@ -156,7 +166,7 @@ def draw_chart(
     problem is then solved), otherwise the least abscissa on the grid that the constraints allow.
 
     Args:
-        layer: ``kind``, ``abscissa``, ``damping_ratio``, ``real_roots`` or a quantity of the chart.
+        layer: a layer of the chart, such as ``kind``, ``abscissa`` or ``petermann``, or one of its quantities.
         design: a solution to mark.
         optimum: whether to draw the star on the layer ``abscissa``.
 
@@ -219,12 +229,15 @@ def _fill_numbers(ax: Axes, chart: Chart, plane: PlaneAxes, layer: str) -> None:
     """Draw a layer of numbers, such as the abscissa or a quantity, with its colour bar."""
     bar_options: dict[str, Any] = {"label": _LAYER_LABELS.get(layer, layer), "extend": "both"}
     values = np.ma.masked_invalid(np.asarray(chart.layers[layer], dtype=float))
-    low, high = np.percentile(values.compressed(), _COLOUR_PERCENTILES) if values.count() else (0.0, 1.0)
-    look = {"cmap": "cividis", "vmin": low, "vmax": high}
+    percentiles = _EXTREME_PERCENTILES if layer in ("petermann", "phase_rigidity") else _COLOUR_PERCENTILES
+    low, high = np.percentile(values.compressed(), percentiles) if values.count() else (0.0, 1.0)
+    look: dict[str, Any] = {"cmap": "cividis", "vmin": low, "vmax": high}
     if layer == "real_roots":
         count = chart.problem.model.degree + 1
         look = {"cmap": colormaps["cividis"].resampled(count), "vmin": -0.5, "vmax": count - 0.5}
         bar_options |= {"ticks": range(count), "extend": "neither"}
+    elif layer == "petermann":
+        look = {"cmap": "cividis", "norm": LogNorm(1.0, max(high, _MIN_PETERMANN_RANGE))}
     elif layer == "abscissa":
         limit = max(abs(low), abs(high)) or 1.0
         look = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}

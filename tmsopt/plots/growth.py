@@ -12,7 +12,17 @@ from matplotlib.typing import LineStyleType
 from tmsopt.dynamics.growth import SPEEDS, Growth, growth
 from tmsopt.dynamics.modes import Mode
 from tmsopt.dynamics.speeds import Speeds
-from tmsopt.plots.labels import COMPLEX_H_LABELS, AxisScale, Name, events_of, finish_axes, place_all, scale_over
+from tmsopt.errors import input_error
+from tmsopt.plots.labels import (
+    COMPLEX_H_LABELS,
+    PETERMANN_LABEL,
+    AxisScale,
+    Name,
+    events_of,
+    finish_axes,
+    place_all,
+    scale_over,
+)
 from tmsopt.plots.style import (
     CAPSIZE,
     COMPLEX,
@@ -49,8 +59,12 @@ EVENTS: Mapping[str, tuple[str, LineStyleType]] = {
 _LABELS = {
     "real": (r"growth rate $\mathrm{Re}\,s$", "growth rate in 1/s"),
     "imag": (r"frequency $\mathrm{Im}\,s$", "frequency in Hz"),
+    "petermann": (PETERMANN_LABEL, PETERMANN_LABEL),
 }
 """Labels of the vertical axis without and with a unit of time."""
+
+_PETERMANN = "petermann"  # the part that draws Petermann factors
+_MAX_PETERMANN = 1e6  # greatest Petermann factor that is shown; only points very near an exceptional point have more
 
 _ROUNDING = 1e-12  # a value below this fraction of the range is shown as 0
 
@@ -97,8 +111,25 @@ def draw_frequencies(data: Growth | Solution, ax: Axes | None = None) -> Axes:
     return _draw(data, ax, "imag")
 
 
+def draw_petermann(data: Growth | Solution, ax: Axes | None = None) -> Axes:
+    """Draw the Petermann factors of all modes on a logarithmic scale, over the same axis as `draw_growth`.
+
+    Raises:
+        InputError: for a `Growth` without Petermann factors.
+
+    Example:
+        >>> dimer = tmsopt.models.from_hamiltonian([["1j*g", "k"], ["k", "-1j*g"]])
+        >>> curves = tmsopt.growth(tmsopt.Problem(dimer, fixed={"g": 1, "k": 2}), over="k", petermann=True)
+        >>> tmsopt.plots.draw_petermann(curves).get_ylabel()
+        'Petermann factor'
+
+    More: docs/explanation/exceptional_points.md
+    """
+    return _draw(data, ax, _PETERMANN)
+
+
 def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: float | None = None) -> Figure:
-    """Draw growth rates and, below them, frequencies in a new figure.
+    """Draw growth rates and, below them, frequencies and the Petermann factors if `data` has them, in a new figure.
 
     Args:
         metres_per_second: the speed at Fr = 1; if given, an additional axis shows the speed.
@@ -110,11 +141,13 @@ def growth_figure(data: Growth | Solution, title: str = "", metres_per_second: f
 
     More: docs/explanation/weave_and_capsize.md
     """
-    figure = new_figure(6.4, 6.8)
-    upper, lower = figure.subplots(2, 1, sharex=True)
     data = growth(data) if isinstance(data, Solution) else data
-    axes_names = [(ax, draw_curves(ax, data, part)) for ax, part in ((upper, "real"), (lower, "imag"))]
-    upper.set_xlabel("")
+    parts = ("real", "imag") if data.petermann is None else ("real", "imag", _PETERMANN)
+    figure = new_figure(6.4, 3.4 * len(parts))
+    upper, *lower = figure.subplots(len(parts), 1, sharex=True)
+    axes_names = [(ax, draw_curves(ax, data, part)) for ax, part in zip((upper, *lower), parts, strict=True)]
+    for ax in (upper, *lower[:-1]):
+        ax.set_xlabel("")
     if (speed_unit := metres_per_second) is not None and data.over.name == "Fr":
         speed_axis = upper.secondary_xaxis("top", functions=(lambda x: x * speed_unit, lambda x: x / speed_unit))
         speed_axis.set_xlabel("speed $v$ in m/s")
@@ -162,7 +195,9 @@ def draw_speeds(data: Speeds, ax: Axes | None = None) -> Axes:
 
 
 def _draw(data: Growth | Solution, ax: Axes | None, part: str) -> Axes:
-    data = growth(data) if isinstance(data, Solution) else data
+    data = growth(data, petermann=part == _PETERMANN) if isinstance(data, Solution) else data
+    if part == _PETERMANN and data.petermann is None:
+        raise input_error("found no Petermann factors; accepted: tmsopt.growth(…, petermann=True)", "data")
     ax = ensure_axes(ax, 6.4, 4.4, data.problem.title)
     return finish_axes(ax, draw_curves(ax, data, part))
 
@@ -172,7 +207,7 @@ def draw_curves(ax: Axes, data: Growth, part: str) -> list[Name]:
     scale, is_complex = scale_over(data.problem.posed, data.over), _is_complex_H(data)
     draw_bands(ax, scale.to_axis(data.stable), scale.to_axis(data.heavily_damped))
     names = list(dict.fromkeys(mode.name for mode in sorted(data.modes, key=lambda m: _rank_mode(m, data.design))))
-    modes = [m for m in data.modes if part == "real" or is_complex or m.roots.imag.any()]
+    modes = [m for m in data.modes if part != "imag" or is_complex or m.roots.imag.any()]
     curves = [(m, _compute_heights(data, m.values, m.roots, part)) for m in modes]
     for mode, y in curves:
         index = names.index(mode.name)
@@ -186,12 +221,15 @@ def draw_curves(ax: Axes, data: Growth, part: str) -> list[Name]:
         xlabel=scale.label,
         xlim=scale.to_axis([start, data.values[-1]]),
     )
-    if is_complex:
+    if part == _PETERMANN:
+        ax.set_yscale("log")
+        ax.set_ylim(top=min(ax.get_ylim()[1], _MAX_PETERMANN))
+    elif is_complex:
         ax.margins(y=_VERTICAL_MARGIN)
     else:
         ax.set_ylim(_find_limits(data, curves, part))
     mode_names = _name_modes(ax, scale, curves)
-    if is_complex:
+    if is_complex and part != _PETERMANN:
         kind = "EP{}" if "EP" in data.structure else "{}-fold"
         for root, (value, multiple_root) in zip(data.multiple, _list_multiple_roots(data), strict=True):
             height = _compute_heights(data, value, multiple_root, part).item()
@@ -200,7 +238,12 @@ def draw_curves(ax: Axes, data: Growth, part: str) -> list[Name]:
 
 
 def _compute_heights(data: Growth, values: Any, roots: Any, part: str) -> Array:
-    """Heights of roots in the Axes at parameter values: growth rates or frequencies; for a complex H, ω = i s."""
+    """Heights of roots in the Axes at parameter values: growth rates, frequencies (Re ω of a complex H) or factors."""
+    if part == _PETERMANN:
+        assert data.petermann is not None
+        rows = np.searchsorted(data.values, values)
+        nearest = np.abs(data.roots[rows] - roots[:, None]).argmin(axis=1)
+        return np.asarray(data.petermann[rows, nearest])
     heights = np.asarray(getattr(np.asarray(roots), part), dtype=float)
     if data.rate is not None:
         heights = heights * np.interp(values, data.values, data.rate) / (1 if part == "real" else 2 * np.pi)
@@ -226,7 +269,7 @@ def _draw_marks(ax: Axes, data: Growth, scale: AxisScale, part: str) -> None:
     ax.axvline(float(scale.to_axis(data.design)), color=LINE, linestyle=":", label=label)
     multiple_roots = [(c.at, complex(c.root.re, c.root.im)) for c in data.events if "EP" in c.kind]
     multiple_roots += _list_multiple_roots(data)
-    if multiple_roots:
+    if multiple_roots and part != _PETERMANN:  # where roots meet, the Petermann factor is infinite
         values, roots = zip(*multiple_roots, strict=True)
         label = "eigenfrequencies meet" if _is_complex_H(data) else "roots meet"
         x, y = scale.to_axis(values), _compute_heights(data, values, roots, part)

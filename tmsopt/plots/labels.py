@@ -22,8 +22,13 @@ _FONT_SIZE = 8
 
 _SAME_POINT = 0.02  # points that are closer than this fraction of an axis share one label
 
-COMPLEX_H_LABELS = {"real": r"$\mathrm{Im}\,\omega$ (loss negative)", "imag": r"$\mathrm{Re}\,\omega$"}
-"""Axis labels of the real and imaginary parts of s = −i ω for a complex H (a matrix with gain or loss)."""
+PETERMANN_LABEL = "Petermann factor"
+COMPLEX_H_LABELS = {
+    "real": r"$\mathrm{Im}\,\omega$ (loss negative)",
+    "imag": r"$\mathrm{Re}\,\omega$",
+    "petermann": PETERMANN_LABEL,
+}
+"""Axis labels of the parts of s = −i ω for a complex H (a matrix with gain or loss), and of its Petermann factor."""
 
 
 @dataclass(frozen=True)

@@ -4,23 +4,28 @@ Each set of expressions becomes one formula, which is evaluated on columns: an a
 Columns with error bounds (`Bounded`) give values with error bounds.
 """
 
+import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tmsopt.algebra.arrays import evaluate_on_arrays
 from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.errors import Fault, InputError
-from tmsopt.models import Model, Values
+from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.models.expression import Expression, ExpressionError
 from tmsopt.models.model import ROOTS
+from tmsopt.models.stated.pairs import list_parts
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, regularise
 from tmsopt.records import AnyNumbers
-from tmsopt.roots import find_motion, roots
+from tmsopt.roots import Conditioning, find_conditioning, find_motion, roots
+
+_MAX_ENTRIES = 2**18  # largest number of entries of the state matrices that are computed together: 4 MB for each array
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,54 @@ def _cached_function(problem: Posed, expressions: tuple[str | Expression, ...]) 
 def coefficients_of(problem: Posed, columns: AnyNumbers) -> list[Any]:
     """Coefficients of designs; each has the shape of the columns that it depends on."""
     return evaluate_on_arrays(coefficient_formula(problem.model, problem.parameter_set.name), columns)
+
+
+def evaluate_matrices(model: Model, parameter_set: ParameterSet, columns: AnyNumbers) -> NDArray[Any]:
+    """Matrices P₀ … P_d of L(s) = Σ Pₖ s^(d−k) for many designs, shape (…, d + 1, n, n); complex for a complex H.
+
+    Coefficients without matrices are matrices with one entry.
+
+    Args:
+        columns: every parameter of the set, as numbers or arrays that broadcast.
+    """
+    entries, matrix_shape = _matrix_formula(model, parameter_set.name)
+    shape = np.broadcast_shapes(*map(np.shape, columns.values()))
+    parts = np.stack([np.broadcast_to(x, shape) for x in evaluate_on_arrays(entries, columns)], axis=-1)
+    numbers = parts[..., ::2] + 1j * parts[..., 1::2] if model.is_complex else parts[..., ::2]
+    return numbers.reshape(*shape, *matrix_shape)
+
+
+@lru_cache(maxsize=64)
+def _matrix_formula(model: Model, set_name: str) -> tuple[Formula, tuple[int, int, int]]:
+    """Real and imaginary part of each entry of the matrices as a formula, and the shape of the matrices."""
+    parameter_set = model.parameter_set(set_name)
+    symbols = {n: symbol(n) for n in parameter_set.names}
+    if model.pencil is not None:
+        matrices = model.pencil(parameter_set.native(symbols))
+    else:
+        matrices = tuple([[c]] for c in model.coefficients(symbols, parameter_set))
+    n = len(matrices[0])
+    return formula(list_parts(matrices), parameter_set.names), (len(matrices), n, n)
+
+
+def find_eigenvalues(model: Model, parameter_set: ParameterSet, columns: AnyNumbers) -> Conditioning:
+    """All eigenvalues of many designs with their sensitivities, shape (…, number of eigenvalues).
+
+    Args:
+        columns: as for `evaluate_matrices`.
+    """
+    shape = np.broadcast_shapes(*map(np.shape, columns.values()))
+    flat_columns = {n: np.broadcast_to(x, shape).reshape(-1) for n, x in columns.items()}
+    _, (terms, n, _) = _matrix_formula(model, parameter_set.name)
+    step = max(1, _MAX_ENTRIES // ((terms - 1) * n) ** 2)
+    blocks = [
+        find_conditioning(
+            evaluate_matrices(model, parameter_set, {m: x[k : k + step] for m, x in flat_columns.items()})
+        )
+        for k in range(0, math.prod(shape), step)
+    ]
+    arrays = zip(*(vars(block).values() for block in blocks), strict=True)
+    return Conditioning(*(np.concatenate(parts).reshape(*shape, -1) for parts in arrays))
 
 
 @lru_cache(maxsize=64)

@@ -6,6 +6,7 @@ first. `patterns` finds out which roots coincide, and `quartics` solves millions
 
 from tmsopt.roots.batch import classify, find_motion
 from tmsopt.roots.chains import make_cluster, schur_form
+from tmsopt.roots.conditioning import Conditioning, condition_eigenvalue, find_conditioning
 from tmsopt.roots.count import real_roots
 from tmsopt.roots.exact import exact_abscissa, exact_roots
 from tmsopt.roots.jordan import exact_longest, exact_nullity, has_one_eigenvector, is_regular, jordan
@@ -23,6 +24,7 @@ __all__ = [
     "CLASSES",
     "PATTERNS",
     "Classes",
+    "Conditioning",
     "Factors",
     "Motion",
     "Pattern",
@@ -33,6 +35,7 @@ __all__ = [
     "backward_error",
     "classify",
     "composition",
+    "condition_eigenvalue",
     "determinant",
     "discriminant",
     "evaluate",
@@ -40,6 +43,7 @@ __all__ = [
     "exact_longest",
     "exact_nullity",
     "exact_roots",
+    "find_conditioning",
     "find_motion",
     "has_one_eigenvector",
     "hurwitz_minors",

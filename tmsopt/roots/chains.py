@@ -163,15 +163,20 @@ def size_at(matrices: Complex, s: complex) -> float:
     return float(sum(abs(s) ** (d - k) * np.linalg.norm(P, 2) for k, P in enumerate(matrices))) or 1.0
 
 
-def linearise(matrices: Complex) -> Complex:
-    """The matrix with the same eigenvalues, of shape (d n, d n). Its last n rows are −P₀⁻¹ (P_d … P₁).
+def linearise(matrices: Any) -> Any:
+    """The state matrix, with the same eigenvalues, of shape (…, d n, d n). Its last n rows are −P₀⁻¹ (P_d … P₁).
+
+    Args:
+        matrices: real or complex arrays of shape (…, d + 1, n, n).
 
     Raises:
         LinAlgError: if P₀ is singular.
     """
-    d, n = len(matrices) - 1, len(matrices[0])
-    M = np.eye(d * n, k=n, dtype=complex)
-    M[-n:] = -np.linalg.solve(matrices[0], np.hstack(list(matrices[:0:-1])))
+    *shape, terms, n, _ = matrices.shape
+    size = (terms - 1) * n
+    leading, *others = np.moveaxis(matrices, -3, 0)
+    M = np.zeros((*shape, size, size), dtype=matrices.dtype) + np.eye(size, k=n)
+    M[..., -n:, :] = -np.linalg.solve(leading, np.concatenate(others[::-1], axis=-1))
     return M
 
 

@@ -2,7 +2,7 @@
 
 import operator
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,6 +100,12 @@ def join(re: Any, im: Any) -> Any:
 def is_complex_entry(x: Any) -> bool:
     """Whether an entry as the user wrote it is complex: a number, a pair, or a text with 1j."""
     return isinstance(x, complex | np.complexfloating | tuple) or (isinstance(x, str) and replace_literals(x) != x)
+
+
+def list_parts(matrices: Iterable[Iterable[Iterable[Any]]]) -> list[Any]:
+    """Real and imaginary part of each entry of some matrices, in order."""
+    entries = (entry_pair(x) for P in matrices for row in P for x in row)
+    return [part for entry in entries for part in (entry.re, entry.im)]
 
 
 def is_real(x: Pair) -> bool:

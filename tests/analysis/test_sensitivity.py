@@ -1,0 +1,119 @@
+"""Phase rigidity, Petermann factor and condition number of the eigenvalues of solutions, against closed forms."""
+
+import json
+import math
+import pickle
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+import tmsopt
+from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
+
+
+def eigenvalues(model, **fixed):
+    return tmsopt.eigenvalues(tmsopt.Problem(model, fixed=fixed))
+
+
+def test_two_lossy_modes():
+    """K = k²/(k² − k₀²), k₀ = |g1 − g2|/2, and ω = −i (g1 + g2)/2 ± √(k² − k₀²); the condition is √K."""
+    found = eigenvalues(from_hamiltonian([["-1j*g1", "k"], ["k", "-1j*g2"]]), g1=1.0, g2=0.2, k=0.5)
+    assert sorted(s.eigenfrequency.real for s in found.entries) == pytest.approx([-0.3, 0.3], rel=1e-12)
+    for s in found.entries:
+        assert (s.re, s.im) == pytest.approx((-0.6, -s.eigenfrequency.real), rel=1e-12)
+        assert s.petermann == pytest.approx(0.25 / 0.09, rel=1e-12)
+        assert s.phase_rigidity == pytest.approx(0.6, rel=1e-12)
+        assert s.condition == pytest.approx(1 / 0.6, rel=1e-12)
+
+
+MATRICES = {"M": [[2, 0.3], [0.3, 1]], "D": [[0.4, -0.1], [0.2, 0.5]], "K": [[3, -1], [-0.5, 2]]}
+
+
+def test_two_masses():
+    """Against SciPy's eigenvectors of (q, q′), and the definition of Tisseur (2000) by null vectors of L(s)."""
+    M, D, K = (np.array(P, dtype=float) for P in MATRICES.values())
+    named = {n: [[f"m*{x}" if n == "M" else x for x in row] for row in P] for n, P in MATRICES.items()}
+    found = eigenvalues(from_matrices(**named), m=1.0)
+    A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+    values, left, right = scipy.linalg.eig(A, left=True)
+    assert len(found.entries) == 4
+    for s in found.entries:
+        z = complex(s.re, s.im)
+        k = abs(values - z).argmin()
+        assert s.eigenfrequency is None
+        assert s.phase_rigidity == pytest.approx(abs(left[:, k].conj() @ right[:, k]), rel=1e-12)
+        U, _, V = np.linalg.svd(M * z**2 + D * z + K)
+        size = sum(np.linalg.norm(P, 2) * abs(z) ** n for P, n in ((M, 2), (D, 1), (K, 0)))
+        assert s.condition == pytest.approx(size / abs(U[:, 1].conj() @ (2 * z * M + D) @ V[1].conj()), rel=1e-11)
+
+
+def test_coefficients_are_a_matrix_with_one_entry():
+    """s² + c s + k: κ = (|s|² + c |s| + k)/|2 s + c|."""
+    found = eigenvalues(from_coefficients([1, "c", "k"]), c=0.6, k=2.0)
+    for s in found.entries:
+        z = complex(s.re, s.im)
+        assert s.condition == pytest.approx((4 + 0.6 * math.sqrt(2)) / abs(2 * z + 0.6), rel=1e-13)
+
+
+def test_defective_and_simple_eigenvalues_of_one_design():
+    """A chain of 3 next to a simple one with K = 10/9; infinity is null in JSON."""
+    A = [["-a", 1, 0, 0], [0, "-a", 1, 0], [0, 0, "-a", 0], [0, 0, 1, "-b"]]
+    problem = tmsopt.Problem(from_matrices(A=A), fixed={"a": 2.0, "b": 5.0})
+    found = tmsopt.eigenvalues(problem)
+    simple, multiple = sorted(found.entries, key=lambda s: s.re)
+    assert (multiple.multiplicity, multiple.phase_rigidity) == (3, 0)
+    assert multiple.petermann == multiple.condition == math.inf
+    assert (simple.multiplicity, simple.petermann) == (1, pytest.approx(10 / 9, rel=1e-12))
+    (diagnosis,) = tmsopt.diagnose(problem)
+    assert (diagnosis.kind, diagnosis.phase_rigidity, diagnosis.petermann) == ("defective", 0, math.inf)
+    entry = json.loads(json.dumps(diagnosis.to_json(), allow_nan=False))
+    assert (entry["phase_rigidity"], entry["petermann"], entry["condition"]) == (0, None, None)
+    data = json.loads(json.dumps(found.to_json(), allow_nan=False))["eigenvalues"]
+    assert sorted(map(str, data[0])) == sorted(["re", "im", "multiplicity", "phase_rigidity", "petermann", "condition"])
+    assert [[s[n] for n in ("phase_rigidity", "petermann", "condition")] for s in data if s["multiplicity"] == 3] == [
+        [0, None, None]
+    ]
+
+
+def test_a_semisimple_eigenvalue_has_the_norm_of_its_projector():
+    """A = S diag(−a, −a, −b) S⁻¹ of whole numbers."""
+    S = np.array([[1, 0, 1], [0, 1, 2], [0, 0, 1]])
+    left = np.linalg.inv(S)
+    A = [
+        [" + ".join(f"({S[i, k] * left[k, j]:.0f})*({x})" for k, x in enumerate(("-a", "-a", "-b"))) for j in range(3)]
+        for i in range(3)
+    ]
+    problem = tmsopt.Problem(from_matrices(A=A), fixed={"a": 1.0, "b": 3.0})
+    wanted = np.linalg.norm(S[:, :2] @ left[:2], 2)
+    (diagnosis,) = tmsopt.diagnose(problem)
+    found = {s.multiplicity: s for s in tmsopt.eigenvalues(problem).entries}
+    assert diagnosis.kind == "semisimple"
+    for s in (diagnosis, found[2]):
+        assert (s.phase_rigidity, s.condition) == pytest.approx((1 / wanted, wanted), rel=1e-9)
+    assert found[1].condition == pytest.approx(np.linalg.norm(S[:, 2]) * np.linalg.norm(left[2]), rel=1e-12)
+
+
+def test_a_chain_without_a_polynomial_at_its_exceptional_point():
+    """Eight modes with gain g and loss g at the ends merge at ω = 0 for g = 1; the others against SciPy."""
+    n = 8
+    hopping = np.eye(n, k=1) + np.eye(n, k=-1)
+    H = hopping.tolist()
+    H[0][0], H[-1][-1] = "1j*g", "-1j*g"
+    model = from_hamiltonian(H)
+    assert model.polynomial is None
+    multiple, *others = sorted(eigenvalues(model, g=1.0).entries, key=lambda s: -s.multiplicity)
+    assert (multiple.multiplicity, multiple.petermann) == (2, math.inf)
+    values, left, right = scipy.linalg.eig(hopping + np.diag([1j, *(n - 2) * [0], -1j]), left=True)
+    assert len(others) == n - 2
+    for s in others:
+        k = abs(values - s.eigenfrequency).argmin()
+        assert s.phase_rigidity == pytest.approx(abs(left[:, k].conj() @ right[:, k]), rel=1e-7)
+
+
+def test_what_a_result_of_eigenvalues_can_do():
+    found = tmsopt.eigenvalues("problems/whipple_benchmark.toml")
+    assert pickle.loads(pickle.dumps(found)).entries == found.entries
+    frame = found.to_frame()
+    assert list(frame["petermann"]) == [s.petermann for s in found.entries]
+    assert "Petermann" in found.report()
