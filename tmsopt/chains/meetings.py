@@ -105,13 +105,21 @@ def _number(root: Root | MultipleRoot) -> complex:
     return complex(root.re, root.im)
 
 
-def nearest_crossing(problem: Posed, pattern: Pattern, parameters: Numbers) -> dict[str, float]:
-    """The parameters near a design at which its located roots cross, more accurate than from the coefficients."""
+def nearest_crossing(
+    problem: Posed, pattern: Pattern, parameters: Numbers, reach: float = _MAX_DISTANCE
+) -> dict[str, float]:
+    """The parameters near a design at which its located roots cross; without a crossing nearby, those of the design.
+
+    Args:
+        reach: greatest distance of the crossing, as a share of the box.
+    """
     roots = _located_roots(problem, pattern, parameters)
+    if not roots:
+        return {n: float(parameters[n]) for n in problem.free}
     root = max(roots, key=lambda r: r.multiplicity)
-    crossing, _ = _find_crossing(
-        problem, parameters, _number(root), root.multiplicity, _unit(problem, parameters, root, roots)
-    )
+    multiplicity = root.multiplicity
+    unit = _unit(problem, parameters, root, roots)
+    crossing, _ = _find_crossing(problem, parameters, _number(root), multiplicity, unit, reach)
     return {n: min(max(crossing[n], low), high) for n, (low, high) in problem.free.items()}
 
 
@@ -134,7 +142,9 @@ def _unit(problem: Posed, parameters: Numbers, root: Root, roots: Sequence[Root]
     return (largest if problem.model.is_complex else max(abs(_number(root)), _MIN_UNIT * largest)) or 1.0
 
 
-def _find_crossing(problem: Posed, parameters: Numbers, s: complex, k: int, unit: float) -> tuple[Numbers, complex]:
+def _find_crossing(
+    problem: Posed, parameters: Numbers, s: complex, k: int, unit: float, reach: float = _MAX_DISTANCE
+) -> tuple[Numbers, complex]:
     """The crossing near a design and its root; without a crossing nearby, the design and s.
 
     Coefficients determine a crossing with half of their digits only, so the design may be 1e-5 away from it. At the
@@ -163,6 +173,6 @@ def _find_crossing(problem: Posed, parameters: Numbers, s: complex, k: int, unit
             residual, *rows = np.concatenate([columns.real, columns.imag], axis=1)
             step = np.linalg.lstsq(np.array(rows).T, -residual, rcond=1e-9)[0]
             p, z = p + family.widths * step[:-2], z + unit * complex(*step[-2:])
-            if (np.abs(p - start) > _MAX_DISTANCE * family.widths).any():
+            if (np.abs(p - start) > reach * family.widths).any():
                 break
     return parameters, s

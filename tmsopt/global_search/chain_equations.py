@@ -31,6 +31,7 @@ MAX_PROVED_SIZE = 40
 
 _ON_AXIS = 1e-9  # relative distance of an eigenvalue from the axis of a symmetry
 _PROOF_DIGITS = 40  # decimal digits of a proved point
+_GUARD_DIGITS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,13 +332,15 @@ def prove_point(problem: Posed, parameters: Numbers) -> Enclosure | None:
     There must be as many free parameters as conditions. Numbers stand for the shortest decimals that print them.
     """
     assert problem.pattern is not None
-    exact = {n: flint.arb(x) for n, x in problem.exactly(problem.ordered(parameters)).items()}
-    try:
-        system = build_chain_equations(problem, problem.pattern, parameters)
-        names = [*problem.free, *system.unknowns]
-        middle = refine_solution(system, {**exact, **next(system.start_values())}, names, _PROOF_DIGITS, system.units)
-        enclosure = enclose_solution(system, middle, names, _PROOF_DIGITS, system.units)
-        system.check({**exact, **enclosure.balls})
-        return enclosure
-    except ProofFailed:
-        return None
+    with flint.ctx.workdps(_PROOF_DIGITS + _GUARD_DIGITS):
+        exact = {n: flint.arb(x) for n, x in problem.exactly(problem.ordered(parameters)).items()}
+        try:
+            system = build_chain_equations(problem, problem.pattern, parameters)
+            names = [*problem.free, *system.unknowns]
+            start = {**exact, **next(system.start_values())}
+            middle = refine_solution(system, start, names, _PROOF_DIGITS, system.units)
+            enclosure = enclose_solution(system, middle, names, _PROOF_DIGITS, system.units)
+            system.check({**exact, **enclosure.balls})
+        except ProofFailed:
+            return None
+    return enclosure

@@ -43,7 +43,8 @@ def advice(text: str, can_parse: Callable[[str], bool]) -> str:
         can_parse: function that returns whether a text parses.
     """
     if re.search(r"\d[jJ]\b", text):
-        return "; expressions are real: write real and imaginary part as two numbers; only the matrix H may be complex"
+        only = "only matrices and coefficients may be complex"
+        return f"; expressions are real: write real and imaginary part as two numbers; {only}"
     if missing_count := text.count("(") - text.count(")"):
         return f"; a {'()'[missing_count > 0]} is missing"
     repaired_text = text.strip()

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from typing import Any
 
 import flint
 import numpy as np
@@ -18,10 +19,12 @@ from tmsopt.algebra.balls import rational
 from tmsopt.algebra.formula import UnsupportedOperation, constant, fold, formula, symbol
 from tmsopt.algebra.identity import Field
 from tmsopt.algebra.kinds import values
-from tmsopt.models.stated.pairs import Pair
-from tmsopt.problem.problem import Posed
+from tmsopt.models import from_coefficients
+from tmsopt.models.stated.pairs import Pair, pair
+from tmsopt.problem.problem import Posed, Problem
 from tmsopt.records import Complex
 from tmsopt.roots import composition
+from tmsopt.roots.polynomial import characteristic_polynomial
 
 _MAX_SIZE = 12  # rows of the largest matrix for which any S is sought, not only the usual ones
 _SAMPLES = 3  # designs at which S is computed
@@ -79,17 +82,13 @@ def find_symmetry(problem: Posed) -> Symmetry:
     """The symmetries of a problem that has matrices."""
     model = problem.model
     assert model.pencil is not None
-    free = {n: symbol(n) for n in problem.free}
-    parameters = problem.ordered({**problem.as_nodes(problem.fixed), **free})
-    *others, rows = model.pencil(problem.parameter_set.native(parameters))
+    *others, rows = _evaluate_matrices(problem)
     if not model.is_complex:
         return Symmetry(is_real=len(others) == 2 and all(constant(x).fraction == 0 for row in others[1] for x in row))
-    H = [[Pair(x.im, -x.re) for x in row] for row in rows]  # the rows are those of i H
-    n = len(H)
     if len(others) != 1:
         return NONE
-    mean = sum((H[k][k] for k in range(n)), Pair(constant(0))) / n
-    H = [[x - mean if i == j else x for j, x in enumerate(row)] for i, row in enumerate(H)]
+    H, mean = centre_matrix(rows)
+    n = len(H)
     conjugate = [[Pair(x.re, -x.im) for x in row] for row in H]
     negative = [[-x for x in row] for row in H]
     samples = _sample(problem, H)
@@ -101,6 +100,44 @@ def find_symmetry(problem: Posed) -> Symmetry:
         is_chiral=any(_holds(S, H, negative) for S in _candidates(samples, -samples)),
         has_loss=bool(abs(_sample(problem, [[mean]]).imag).max() > 0),
     )
+
+
+def _evaluate_matrices(problem: Posed) -> Sequence[Any]:
+    """The matrices with the free parameters as symbols."""
+    free = {n: symbol(n) for n in problem.free}
+    parameters = problem.ordered({**problem.as_nodes(problem.fixed), **free})
+    assert problem.model.pencil is not None
+    return problem.model.pencil(problem.parameter_set.native(parameters))
+
+
+def centre_matrix(rows: Sequence[Sequence[Any]]) -> tuple[Rows, Pair]:
+    """H minus its mean eigenfrequency, and that mean, for i H."""
+    H, n = [[Pair(x.im, -x.re) for x in row] for row in rows], len(rows)
+    mean = sum((H[k][k] for k in range(n)), Pair(constant(0))) / n
+    return [[x - mean if i == j else x for j, x in enumerate(row)] for i, row in enumerate(H)], mean
+
+
+@lru_cache(maxsize=16)
+def reduce_problem(problem: Posed) -> Posed | None:
+    """The same question about real roots of det(ω − H′), if it is real; its unknowns are the free parameters.
+
+    None if it is not real, or if limits use anything else than free parameters.
+    """
+    model, names = problem.model, tuple(problem.free)
+    if not model.is_doubled or problem.pattern is None or not names or problem.objective is not None or problem.cases:
+        return None
+    has_other_parts = any(kind != "EP" for kind, _, _ in composition(problem.pattern.name))
+    uses_other_names = any(not set(c.names) <= set(names) for c in problem.conditions.values())
+    if has_other_parts or uses_other_names or not find_symmetry(problem).is_real:
+        return None
+    *_, rows = _evaluate_matrices(problem)
+    coefficients = [pair(c).re for c in characteristic_polynomial(centre_matrix(rows)[0])]
+    if set(formula(coefficients).inputs) != set(names):
+        return None
+    reduced = from_coefficients(coefficients, name="reduced")
+    return Problem(
+        reduced, free=dict(problem.free), locate=problem.locate, constraints=problem.constraints, start=problem.start
+    ).posed
 
 
 def _sample(problem: Posed, rows: Rows) -> Complex:

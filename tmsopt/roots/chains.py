@@ -108,13 +108,15 @@ class Chain:
     def backward_error(self, size: float) -> float:
         """Size of a change of the matrices, relative to `size`, after which λ has exactly this chain.
 
-        The change is −Σ F_j b w_j*, where w_j are dual to the vectors of the chain, in all powers of s.
+        The change is −Σ F_j b w_j*, where w_j are dual to the vectors of the chain, in all powers of s. If these are
+        not independent, no change may do; what it leaves is added.
         """
         count = min(len(self.terms) - 1, self.order)
         padded = np.concatenate([np.zeros((count, len(self.right[0]))), self.right * self.powers[:, None]])
         stacked = np.hstack([padded[count - i : len(padded) - i] for i in range(max(count, 1))])
-        dual = np.linalg.pinv(stacked)
-        return float(np.linalg.norm(dual @ self.residuals)) / size
+        change = np.linalg.pinv(stacked) @ self.residuals
+        missed = float(np.linalg.norm(stacked @ change - self.residuals))
+        return float(np.linalg.norm(change)) / size + (missed / size if missed <= size else np.inf)
 
 
 def make_chain(matrices: Complex, s: complex, order: int, borders: tuple[Complex, Complex]) -> Chain:

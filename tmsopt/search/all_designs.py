@@ -9,23 +9,25 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from tmsopt.chains import family_of, find_point, targets_of
+from tmsopt.chains import family_of, find_point, nearest_crossing, targets_of
 from tmsopt.errors import input_error, is_number, short
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.global_search import Completeness, prove_completeness
 from tmsopt.global_search.chain_equations import MAX_PROVED_SIZE, prove_point
 from tmsopt.global_search.completeness import SECONDS
 from tmsopt.problem import Posed, ProblemSource, Solution, degrees_of_freedom, pose
+from tmsopt.problem.symmetry import reduce_problem
 from tmsopt.problem.validate import MIN_SIZE
 from tmsopt.program import NLP, CommonOptions, Options, formulate_matching, make_options
 from tmsopt.program.formulate import design_of
 from tmsopt.program.options import documents_options
 from tmsopt.program.starts import complete_starts, sample_box
-from tmsopt.progress import begin
+from tmsopt.progress import ReportCount, begin
 from tmsopt.records import Array, Table, Tabular, plain
+from tmsopt.roots import composition
 from tmsopt.search.all_points import prove_all_points
 from tmsopt.search.local_search import solve_from
-from tmsopt.search.locate import has_chains
+from tmsopt.search.locate import REACH_OF_CROSSING, has_chains
 from tmsopt.search.newton import build_square_system, estimate_error, find_zero, make_zero
 from tmsopt.search.solve import solve_any_status
 from tmsopt.search.state import SearchState, Start, clip_to_box, is_close
@@ -154,7 +156,7 @@ def solve_all(problem: ProblemSource, *, seconds: float = SECONDS, **options: Un
     begin(own_options.progress, "proving that no design is missed", "s")
     proof = prove_all_points(problem) if seconds > 0 else None
     if proof is None and seconds > 0 and problem.model.polynomial is not None:
-        proof = prove_completeness(problem, seconds, own_options.progress)
+        proof = _prove_completeness(problem, seconds, own_options.progress)
     proved_entries = list[_IsolatedDesign]()
     for intervals in proof.designs if proof else ():
         errors = {n: float(x.radius) for n, x in intervals.items()} | {"abscissa": 0.0}
@@ -278,7 +280,33 @@ def _find_chain_ends(problem: Posed, options: Options) -> Iterator[list[_End]]:
             yield []
             continue
         design = dict(zip(problem.free, np.clip(point.p, low, high).tolist(), strict=True))
+        if not point.is_found:
+            design = nearest_crossing(problem, problem.pattern, problem.ordered(design), REACH_OF_CROSSING)
         yield [_End(_drop_tiny(design), point.is_isolated, partial(point.estimate_errors, list(problem.free)))]
+
+
+def _prove_completeness(problem: Posed, seconds: float, progress: ReportCount | None) -> Completeness:
+    """Prove that no design is missed; with a symmetry, in the real problem that it leaves."""
+    reduced = reduce_problem(problem) or problem
+    if degrees_of_freedom(reduced).of_equations != 0:
+        return Completeness(False, "branch and prune does not use the symmetry that holds here")
+    if reduced is problem:
+        return prove_completeness(problem, seconds, progress)
+    proof = prove_completeness(reduced, seconds, progress)
+    designs = [d for d in proof.designs if not _has_crossing(problem, d)]
+    limits = [limit for d, limit in zip(proof.designs, proof.limits, strict=True) if d in designs]
+    proof = replace(proof, designs=tuple(designs), limits=tuple(limits))
+    order = max(c for _, c, _ in composition(str(problem.pattern and problem.pattern.name)))
+    if proof.complete and 2 * order <= problem.model.size:
+        reason = (
+            "points at which two conjugate eigenfrequencies are multiple, off the line of symmetry, are not excluded"
+        )
+        return replace(proof, complete=False, reason=reason)
+    return proof
+
+
+def _has_crossing(problem: Posed, design: Mapping[str, Any]) -> bool:
+    return recheck(problem, problem.ordered({n: float(x) for n, x in design.items()})).is_crossing
 
 
 def _check_isolated(problem: Posed) -> None:

@@ -13,7 +13,7 @@ from tmsopt.global_search.chain_equations import prove_point
 from tmsopt.problem import Posed
 from tmsopt.records import Table
 
-_WORK_DIGITS = 60  # decimal digits of the arithmetic of a proof
+_WORK_DIGITS = 60  # decimal digits in which points are written
 _RESULT_DIGITS = 25  # decimal digits of a point
 
 

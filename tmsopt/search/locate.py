@@ -6,7 +6,16 @@ from itertools import chain, islice
 
 import numpy as np
 
-from tmsopt.chains import ExceptionalPoint, Family, Target, family_of, find_point, measure_point, targets_of
+from tmsopt.chains import (
+    ExceptionalPoint,
+    Family,
+    Target,
+    family_of,
+    find_point,
+    measure_point,
+    nearest_crossing,
+    targets_of,
+)
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem import Posed, Starts, degrees_of_freedom
 from tmsopt.problem.solution import OtherBranch
@@ -15,7 +24,10 @@ from tmsopt.program.formulate import default_start
 from tmsopt.program.starts import sample_box
 from tmsopt.progress import begin
 from tmsopt.records import Array, Table
-from tmsopt.search.outcome import Outcome
+from tmsopt.search.outcome import Outcome, assess_design
+
+REACH_OF_CROSSING = 0.02
+"""Greatest distance, as a share of the box, from where a start ends to a point at which eigenvectors do not meet."""
 
 _MIN_STARTS = 12  # starts that look for other solutions
 _SAME_POINT = 1e-7  # relative to each range: points that differ less are one solution
@@ -65,11 +77,12 @@ def locate_by_chains(
         for design in (*extra_starts, *islice(sample_box(problem, options.seed), options.starts))
     )
     begin(options.progress, "searching", "start")
-    found, start_count = list[_Found](), 0
+    found, start_count, end = list[_Found](), 0, None
     for start in chain([first], (_vector(problem, design) for design in further)):
         choice = rng if start_count % 2 else None  # every second start chooses freely which eigenvalues shall meet
         point = find_point(family, targets, start, choice)
         start_count += 1
+        end = end if point is None else np.clip(point.p, *family.box.T)
         if point is not None and point.is_found:
             found = _add(problem, family, found, _shorten(family, targets, point))
         if options.progress:
@@ -82,12 +95,12 @@ def locate_by_chains(
         (f for f in found if not f.violated), key=lambda f: float(np.linalg.norm((f.point.p - first) / family.widths))
     )
     if not feasible:
-        return None
+        return _fail(problem, first if end is None else end, start_count)
     best, others = feasible[0], [f for f in found if f is not feasible[0]]
     is_square = degrees_of_freedom(problem).count <= 0
     checked = recheck(problem, best.parameters)
     if checked.violations:
-        return None
+        return _fail(problem, best.point.p, start_count)
     return Outcome(
         parameters=best.parameters,
         checked=checked,
@@ -101,6 +114,18 @@ def locate_by_chains(
         if is_square
         else (),
     )
+
+
+def _fail(problem: Posed, p: Array, start_count: int) -> Outcome | None:
+    """The outcome if no start leads to a solution; None if the search by factors can follow."""
+    if problem.model.polynomial is not None:
+        return None
+    assert problem.pattern is not None
+    design = problem.ordered(dict(zip(problem.free, p.tolist(), strict=True)))
+    outcome = assess_design(problem, nearest_crossing(problem, problem.pattern, design, REACH_OF_CROSSING))
+    words = "roots meet with more than one eigenvector" if outcome.checked.is_crossing else "try more starts"
+    note = f"none of {start_count} starts ended at an exceptional point within the limits: {words}"
+    return replace(outcome, status="not_converged", starts=Starts(start_count, runs=start_count), notes=(note,))
 
 
 def _shorten(family: Family, targets: Sequence[Target], point: ExceptionalPoint) -> ExceptionalPoint:

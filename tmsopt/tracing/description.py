@@ -11,10 +11,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from tmsopt.chains import family_of
 from tmsopt.chains.meetings import is_crossing
+from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.stability import CROSSING
 from tmsopt.records import Array
 from tmsopt.roots import Pattern, pattern as pattern_of
+from tmsopt.roots.chains import eigenvalues_of
 from tmsopt.tracing.branch import Branch, EventPoint, table_at
 from tmsopt.tracing.continuation import CLOSED, SINGULAR, End, Walk
 from tmsopt.tracing.equations import TracingSetup, prepare_tracing
@@ -30,6 +33,7 @@ _SAME_DESIGN = 1e-6
 _MAX_RESIDUAL = 1e-6  # largest mismatch of a coefficient at a point of a branch
 
 _SQUARE_TOLERANCE = 1e-9  # relative difference of c from b²/4 below which a quadratic factor has a double root
+_ROUNDING = 1e-13  # of an eigenvalue, as a share of their typical size
 
 _EP4 = Event("EP4", lambda points: points.residual)  # an EP4 is located by equations of its own
 
@@ -104,6 +108,38 @@ def make_branch(setup: TracingSetup, walk: Walk, row_events: Sequence[RowEvent])
         closed=walk.closed,
         residual=float(np.max(residual)),
         eigenfrequency=_compute_eigenfrequency(points),
+    )
+
+
+def restate_branch(problem: Posed, branch: Branch) -> Branch:
+    """A branch of the real problem that a symmetry leaves, as a branch of the complex problem.
+
+    Its unknown r is the distance of the multiple eigenfrequency from the mean.
+    """
+    family, count = family_of(problem), len(branch)
+    columns = problem.ordered({n: branch.parameters[n] for n in problem.free})
+    parameters = {n: np.array(np.broadcast_to(v, count), dtype=float) for n, v in columns.items()}
+    matrices = [family.matrices(p) for p in np.array([parameters[n] for n in problem.free]).T]
+    means = np.array([1j * eigenvalues_of(P).mean() for P in matrices])
+    omega = means + branch.unknowns["r"] if "r" in branch.unknowns else means
+    order = int(branch.pattern.removeprefix("EP")) if branch.pattern.startswith("EP") else 1
+    abscissa, zero = np.empty(count), _ROUNDING * family.typical_size
+    for k, P in enumerate(matrices):
+        s = eigenvalues_of(P)  # those that meet are known exactly
+        others = s[np.argsort(np.abs(s + 1j * omega[k]), kind="stable")[order:]]
+        abscissa[k] = max(x if abs(x) > zero else 0.0 for x in (omega[k].imag, *others.real))
+    events = [e for e in branch.events if "EP" in e.name or e.name in ("fold", "end", "constraint")]
+    return replace(
+        branch,
+        parameters=parameters,
+        abscissa=abscissa,
+        stable=abscissa < 0,
+        heavily_damped=np.zeros(count, dtype=bool),
+        events=tuple(replace(e, parameters=table_at(parameters, e.index)) for e in events),
+        eigenfrequency={
+            "omega_re": omega.real,
+            "omega_im": np.where(np.abs(omega.imag) > zero, omega.imag, 0.0),
+        },
     )
 
 

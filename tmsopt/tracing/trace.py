@@ -24,11 +24,12 @@ from tmsopt.models.user_spectrum import pattern_of, patterns_of
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
+from tmsopt.problem.symmetry import reduce_problem
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array
 from tmsopt.tracing.branch import Trace
 from tmsopt.tracing.continuation import Walk
-from tmsopt.tracing.description import make_branches
+from tmsopt.tracing.description import make_branches, restate_branch
 from tmsopt.tracing.equations import prepare_tracing
 from tmsopt.tracing.events import Event, check_events
 from tmsopt.tracing.seeds import find_missed_seeds, find_seeds, walk_new_curves
@@ -81,7 +82,8 @@ def trace(
     counts = ("starts", starts, 0, MOST_STARTS), ("seed", seed, 0, None), ("most", most, _MIN_POINTS, None)
     check_options(problem, step, *counts, through=through, progress=progress)
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
-    setup = prepare_tracing(problem)
+    reduced = reduce_problem(problem)
+    setup = prepare_tracing(reduced or problem)
     walks: list[Walk] = []
     tried_starts = 0
 
@@ -97,6 +99,8 @@ def trace(
     with np.errstate(all="ignore"):  # values near infinity may not be finite
         # a branch with the residual nan is left out
         branches = [b for w in walks for b in make_branches(setup, w, checked_events) if b.residual <= _MAX_RESIDUAL]
+    if reduced:
+        branches = [restate_branch(problem, b) for b in branches]
     branches.sort(key=lambda b: -float(b.arclength[-1]))
     seconds = time.perf_counter() - started
     return Trace(

@@ -69,9 +69,10 @@ def from_matrices(
     The parameters are the names in texts and the symbols (``ca.SX.sym("k")``), in order of appearance.
 
     Args:
-        M, D, K: square, up to 6 × 6, as nested lists, NumPy arrays, SX or DM; D is 0 by default. An entry is a number,
-            text as in a problem file such as ``"1 + mu*w**2"``, or an SX.
-        A: square, up to 12 × 12, in place of M, D and K.
+        M, D, K: square, up to 50 × 50, as nested lists, NumPy arrays, SX or DM; D is 0 by default. An entry is a
+            number, text as in a problem file such as ``"1 + mu*w**2"``, or an SX. If an entry is complex, such as
+            ``"1 + 0.1j*h"``, the system is complex, as in `from_hamiltonian`, and results are about ω = i s.
+        A: square, up to 100 × 100, in place of M, D and K.
         B, C, G: matrices of a controller u = −G y, y = C x, up to 12 × 12. x are the states, or q and then q′. By
             default all are measured. Without B and G there is no controller.
         name: title for reports.
@@ -130,11 +131,10 @@ def from_hamiltonian(H: Any, *, name: str = "stated", quantities: AnyNumbers | N
     """A model of ψ′ = −i H ψ with a complex matrix H and eigenfrequencies ω = i s.
 
     Results refer to H: ``EP2`` is an exceptional point of H, the ``abscissa`` is the greatest Im ω (gain minus loss),
-    and multiplicities belong to H. Internally the model is the real system of twice the size with
-    A = [[J, R], [−R, J]] for H + Ω = R + i J. A `Problem` chooses the carrier Ω for its ranges.
+    and multiplicities belong to H.
 
     Args:
-        H: square, up to 6 × 6, as nested lists or a NumPy array. An entry is a real or complex number, text as in
+        H: square, up to 100 × 100, as nested lists or a NumPy array. An entry is a real or complex number, text as in
             a problem file such as ``"w - 1j*g"`` or ``"k*exp(1j*phi)"``, an SX, or a tuple of two SX, the real and the
             imaginary part. Parameters are real.
         name, quantities: see `from_matrices`; quantities are real.
