@@ -24,7 +24,7 @@ FLOORS = (
     ("evaluation", "charts"),
     ("global_search",),
     ("search",),
-    ("proofs", "analysis", "fronts", "studies"),
+    ("proofs", "analysis", "fronts", "studies", "spectra"),
     ("dynamics",),
     ("paper",),
     ("plots", "guide"),

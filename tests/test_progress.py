@@ -35,6 +35,8 @@ VERBS = [
     ("tracing EP2", partial(tmsopt.trace, PLANE, "EP2")),
     ("tracing weave", partial(tmsopt.domain, PLANE)),
     ("cutting the surface", partial(tmsopt.swallowtail, SPACE, rows=6, across=4, starts=4)),
+    ("searching inside the loop", partial(tmsopt.encircle, "problems/loss_only_dimer.toml", starts=1)),
+    ("computing eigenvalues", partial(tmsopt.sheets, "problems/loss_only_dimer.toml", grid=(9, 9))),
     ("charting", partial(tmsopt.chart, PLANE, points=(40, 30), tile=100)),
     ("tracing capsize", partial(tmsopt.chart, PLANE, points=(40, 30))),
     ("following the front", partial(tmsopt.pareto, "problems/pareto.toml", points=2)),

@@ -37,6 +37,8 @@ ASKED = {
 DRAWN = {
     "chart": lambda given: tmsopt.chart(given, points=(12, 9), boundaries=False).kind.tolist(),
     "trace": lambda given: len(tmsopt.trace(given, "capsize", starts=4).branches),
+    "encircle": lambda given: tmsopt.encircle(given, 1e-3, starts=0).permutation,
+    "sheets": lambda given: tmsopt.sheets(given, grid=(3, 3)).values.tolist(),
     "domain": lambda given: tmsopt.domain(given, starts=4).to_json(),
 }
 """Verbs about a box: nothing need be asked."""
@@ -195,6 +197,10 @@ WRONG = [
         lambda: tmsopt.chart(PLANE, quantities={"trail": 3}),
         "quantities.trail: found 3; accepted: an expression in quotes",
     ),
+    (lambda: tmsopt.encircle(EP4, "wide"), "radius: found 'wide'; accepted: a positive number"),
+    (lambda: tmsopt.encircle(EP4, plane=3), "plane: found 3; accepted: two of"),
+    (lambda: tmsopt.sheets(EP4, over="Fr"), "over: found 'Fr'; accepted: two of"),
+    (lambda: tmsopt.sheets(EP4, grid=81), "grid: found 81; accepted: two whole numbers"),
     (lambda: tmsopt.nearest(EP4, ["weave"]), "pattern: unknown boundary"),
     (lambda: tmsopt.robustness(EP4, parameters=["Fr"]), "parameters: found"),
     (lambda: tmsopt.robustness(EP4, weights=3), "weights: found 3"),

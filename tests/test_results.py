@@ -72,6 +72,10 @@ def every():
     return tmsopt.solve_all(replace(tmsopt.load(PROBLEMS / "ep4_matching.toml"), title=TITLE), seconds=0, starts=8)
 
 
+def dimer():
+    return replace(tmsopt.load(PROBLEMS / "loss_only_dimer.toml"), title=TITLE)
+
+
 def unstable():
     """Not optimal, without a stable design."""
     problem = tmsopt.Problem(
@@ -100,12 +104,14 @@ RESULTS = {
     "Nearest": lambda: tmsopt.nearest(design(), "weave"),
     "Diagnosis": lambda: tmsopt.diagnose(design())[0],
     "Eigenvalues": lambda: tmsopt.eigenvalues(design()),
+    "Loop": lambda: tmsopt.encircle(dimer(), starts=0),
+    "Sheets": lambda: tmsopt.sheets(dimer(), grid=(7, 5)),
     "Domain": lambda: charted().domain,
     "Swallowtail": lambda: tmsopt.swallowtail(tailed(), rows=4, across=3, starts=4),
     "Ledger": lambda: tmsopt.verify(only=["lscf-*"]),
     "Description": lambda: tmsopt.describe(plane()),
 }
-TITLED = "Eigenvalues Solution Front Trace Chart Speeds Simulation Comparison Results Proof Swallowtail Every Robustness Description"
+TITLED = "Eigenvalues Solution Front Trace Loop Sheets Chart Speeds Simulation Comparison Results Proof Swallowtail Every Robustness Description"
 made = cache(lambda name: RESULTS[name]())
 each = pytest.mark.parametrize("name", RESULTS)
 

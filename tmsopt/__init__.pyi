@@ -29,6 +29,10 @@ from .search import (
     Policy as Policy, Rescue as Rescue, SearchState as SearchState, Start as Start, Tuning as Tuning, solve as solve,
     solve_all as solve_all,
 )
+from .spectra import (
+    Cycle as Cycle, EnclosedPoint as EnclosedPoint, Loop as Loop, Sheets as Sheets, encircle as encircle,
+    sheets as sheets,
+)
 from .studies import (
     Results as Results, Row as Row, Sampling as Sampling, Span as Span, Study as Study,
     latin_hypercube as latin_hypercube, load_study as load_study, monte_carlo as monte_carlo, over_grid as over_grid,

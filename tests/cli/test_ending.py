@@ -330,6 +330,8 @@ WORDS = CHEAP | {
     "speeds": f"speeds {PROBLEMS}/whipple_benchmark.toml",
     "simulate": f"simulate {PROBLEMS}/whipple_benchmark.toml --csv out/m.csv --plot out/m.pdf",
     "trace": f"trace {PROBLEMS}/off_law.toml --csv out/t.csv --plot out/t.pdf",
+    "encircle": f"encircle {PROBLEMS}/loss_only_dimer.toml --starts 1 --plot out/l.png",
+    "sheets": f"sheets {PROBLEMS}/loss_only_dimer.toml --grid 9x9 --csv out/z.csv --plot out/z.png",
     "chart": f"chart {PROBLEMS}/chart.toml --points 30x20 --plot out/c.png --output out/c.npz",
     "folder": f"chart {PROBLEMS}/chart.toml --points 30x20 --output out/c.chart",
     "study": f"study {PROBLEMS}/study_decay.toml --store out/s.sqlite --export out/r.csv --workers 2",

@@ -70,6 +70,8 @@ COMMANDS = {
     "front": ("solve {p}/pareto.toml --points 3", {"following the front"}),
     "chart": ("chart {p}/chart.toml --points 60x50", {"charting", "tracing weave", "tracing capsize", "tracing EP2"}),
     "trace": ("trace {p}/ep_set.toml", {"tracing 2EP2"}),
+    "encircle": ("encircle {p}/loss_only_dimer.toml", {"searching", "searching inside the loop"}),
+    "sheets": ("sheets {p}/loss_only_dimer.toml", {"searching", "computing eigenvalues"}),
     "study": ("study study.toml", {"solving rows"}),
     "monte carlo": ("study built.toml", {"searching", "solving rows"}),
     "figure": ("figure growth --output growth.png", {"drawing"}),

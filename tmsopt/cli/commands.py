@@ -28,6 +28,10 @@ _MODULES: Mapping[str, Mapping[str, str]] = {
         "simulate": "Show the motion after a lean or a push, or under noise.",
         "trace": "Trace a root pattern through parameter space.",
     },
+    "spectra": {
+        "encircle": "Follow eigenvalues around exceptional points.",
+        "sheets": "Compute the Riemann sheets over two parameters.",
+    },
     "chart": {"chart": "Chart stability over two or three parameters."},
     "study": {"study": "Solve a problem for every row of a table or sample."},
     "guide": {

@@ -34,6 +34,7 @@ _RESULTS = {
         "Swallowtail": "draw_swallowtail",
         "Chart": "draw_chart",
     },
+    "spectra": {"Loop": "draw_loop", "Sheets": "draw_sheets"},
     "fronts": {"Front": "draw_front"},
     "studies": {"Results": "draw_histogram"},
     "proofs": {"Proof": "draw_roots", "Every": "draw_designs"},

@@ -13,6 +13,9 @@ from .meaning import (
 from .motion import draw_motion as draw_motion, motion_figure as motion_figure
 from .paper.planes import draw_swallowtail as draw_swallowtail
 from .roots import draw_roots as draw_roots, draw_splitting as draw_splitting
+from .spectra import (
+    draw_loop as draw_loop, draw_sheets as draw_sheets, loop_figure as loop_figure, sheets_figure as sheets_figure,
+)
 from .study import draw_histogram as draw_histogram
 from .style import new_figure as new_figure, save as save
 from .trace import draw_trace as draw_trace, trace_figure as trace_figure

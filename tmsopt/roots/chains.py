@@ -108,15 +108,16 @@ class Chain:
     def backward_error(self, size: float) -> float:
         """Size of a change of the matrices, relative to `size`, after which λ has exactly this chain.
 
-        The change is −Σ F_j b w_j*, where w_j are dual to the vectors of the chain, in all powers of s. If these are
-        not independent, no change may do; what it leaves is added.
+        The change is −Σ F_j b w_j*, where w_j are dual to the vectors of the chain, in all powers of s; inf if the
+        vectors are dependent, because there is no such change.
         """
         count = min(len(self.terms) - 1, self.order)
         padded = np.concatenate([np.zeros((count, len(self.right[0]))), self.right * self.powers[:, None]])
         stacked = np.hstack([padded[count - i : len(padded) - i] for i in range(max(count, 1))])
-        change = np.linalg.pinv(stacked) @ self.residuals
-        missed = float(np.linalg.norm(stacked @ change - self.residuals))
-        return float(np.linalg.norm(change)) / size + (missed / size if missed <= size else np.inf)
+        if np.linalg.matrix_rank(stacked) < self.order:  # dependent vectors are no chain
+            return np.inf
+        dual = np.linalg.pinv(stacked)
+        return float(np.linalg.norm(dual @ self.residuals)) / size
 
 
 def make_chain(matrices: Complex, s: complex, order: int, borders: tuple[Complex, Complex]) -> Chain:
