@@ -1,0 +1,197 @@
+"""Exceptional points of matrices by Jordan chains: where they are in closed form, and where there are none."""
+
+import math
+
+import flint
+import numpy as np
+import pytest
+
+import tmsopt
+from tmsopt.chains import family_of, find_discriminant, find_point, measure_point, targets_of
+from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
+from tmsopt.problem.symmetry import find_symmetry
+
+EXACT = 1e-14  # some roundings
+
+
+def spin(n):
+    """S_x + i g S_z: all n eigenfrequencies are ±m √(1 − g²), 0 at g = 1."""
+    S = (n - 1) / 2
+    H = [[0] * n for _ in range(n)]
+    for i in range(n):
+        m = S - i
+        H[i][i] = f"1j*g*{m}"
+        if i + 1 < n:
+            H[i][i + 1] = H[i + 1][i] = f"sqrt({round(S * (S + 1) - m * (m - 1))})/2"
+    return H
+
+
+def point_of(H, free, locate, fixed=None, start=0.5):
+    problem = tmsopt.Problem(from_hamiltonian(H), fixed=fixed or {}, free=free, locate=locate).posed
+    family, targets = family_of(problem), targets_of(locate, is_complex=True)
+    low, high = family.box.T
+    return find_point(family, targets, low + start * (high - low)), family, targets
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 6, 10, 20])
+@pytest.mark.parametrize("start", [0.1, 0.8])
+def test_all_eigenvalues_of_a_spin_meet(n, start):
+    point, *_ = point_of(spin(n), {"g": (0.2, 2.0)}, f"EP{n}", start=start)
+    assert point is not None
+    assert point.is_found
+    assert abs(point.p[0] - 1) <= EXACT
+    assert point.chains[0].order == n
+
+
+@pytest.mark.parametrize(
+    ("H", "free", "locate"),
+    [
+        ([["d", "k"], ["k", "-d"]], {"d": (-1, 1), "k": (-1, 1)}, "EP2"),  # Hermitian
+        ([["a + 1j*b", 0], [0, "0.3 - 0.1j"]], {"a": (-1, 1), "b": (-1, 1)}, "EP2"),  # uncoupled
+        ([["1j*g", 1, 0], [1, "-1j*g", 0], [0, 0, "d"]], {"g": (0.2, 2), "d": (-1, 1)}, "EP3"),  # EP2 beside a mode
+        ([["1j*g", 1, 0, 0], [1, "-1j*g", 0, 0], [0, 0, "1j*g", 1], [0, 0, 1, "-1j*g"]], {"g": (0.2, 2)}, "EP4"),
+    ],
+)
+def test_where_eigenvectors_do_not_meet_there_is_none(H, free, locate):
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(H), free=free, locate=locate), throw=False)
+    assert found.status != "optimal"
+
+
+def test_dependent_vectors_are_no_chain():
+    """At a simple eigenvalue with x₁ = 0 the values F₀ = 0 and F₁ = −1 are no small change of the matrix away."""
+    _, family, targets = point_of([["x", 0], [0, "0.3 - 0.1j"]], {"x": (-1, 1)}, "EP2")
+    point = measure_point(family, targets, np.array([0.0]))
+    assert point is None or not point.is_found
+
+
+@pytest.mark.parametrize(
+    ("system", "free", "locate", "expected"),
+    [
+        (from_matrices([[1]], [["c"]], [[4]]), {"c": (0.5, 9)}, "EP2", {"c": 4.0}),
+        (from_matrices([[1, 0], [0, 1]], None, [[1, "p"], ["-p", 2]]), {"p": (0.1, 1.0)}, "CEP2", {"p": 0.5}),
+        (from_coefficients([1, "2j*b", -4]), {"b": (0.5, 5)}, "EP2", {"b": 2.0}),  # (s + 2i)² = s² + 4 i s − 4
+        (from_matrices(A=[["1j*g", 1], [-1, "-1j*g"]]), {"g": (-3.0, 3.0)}, "EP2", None),  # −g² − 1 never vanishes
+        (from_matrices([[1]], [["2j*b"]], [[-4]]), {"b": (0.5, 5)}, "EP2", {"b": 2.0}),
+    ],
+)
+def test_systems_of_every_kind(system, free, locate, expected):
+    found = tmsopt.solve(tmsopt.Problem(system, free=free, locate=locate), throw=False)
+    assert (found.status == "optimal") is (expected is not None)
+    for name, x in (expected or {}).items():
+        assert abs(found.parameters[name] - x) <= EXACT * abs(x)
+
+
+PT = [["1j*g", "k"], ["k", "-1j*g"]]
+
+
+@pytest.mark.parametrize(
+    ("H", "order", "fixed", "expected"),
+    [
+        (PT, 2, {"k": 1.0}, (2, 1)),
+        ([["w - 1j*g", "k"], ["k", "w"]], 2, {"k": 1.0, "w": 5.0}, (2, 1)),
+        ([["0.1 + 1j*g", "k"], ["k", "-1j*g"]], 2, {"k": 1.0}, (2, 0)),
+        (spin(3), 3, {}, (4, 3)),
+        (spin(5), 5, {}, (8, 6)),
+    ],
+)
+def test_conditions_that_hold_by_symmetry(H, order, fixed, expected):
+    """Counted by hand: 2 (k − 1), half of them for a real polynomial, every second coefficient if it is even or odd."""
+    problem = tmsopt.Problem(from_hamiltonian(H), fixed=fixed, free={"g": (0.1, 3.0)}, locate=f"EP{order}").posed
+    freedom = tmsopt.problem.degrees_of_freedom(problem)
+    assert problem.pattern is not None
+    assert (problem.pattern.codimension, freedom.by_symmetry) == expected
+
+
+def test_a_hermitian_matrix_has_no_point_and_says_so():
+    problem = tmsopt.Problem(
+        from_hamiltonian([["d", "k + 1j*d"], ["k - 1j*d", 1]]), free={"d": (-1, 1), "k": (-1, 1)}, locate="EP2"
+    )
+    assert find_symmetry(problem.posed).is_hermitian
+    assert "Hermitian" in " ".join(tmsopt.solve(problem, throw=False).notes)
+
+
+@pytest.mark.parametrize(("H", "order", "g"), [(PT, 2, 1.0), (spin(3), 3, 1.0)])
+def test_one_parameter_is_enough_and_proved(H, order, g):
+    fixed = {"k": 1.0} if H is PT else {}
+    problem = tmsopt.Problem(from_hamiltonian(H), fixed=fixed, free={"g": (0.1, 3.0)}, locate=f"EP{order}")
+    found = tmsopt.solve(problem)
+    proof = tmsopt.prove(found)
+    assert proof.proved, proof.reason
+    assert proof.geometric_multiplicity == 1
+    assert abs(float(proof.parameters["g"].value) - g) <= EXACT
+
+
+def test_all_points_of_a_pt_dimer_and_its_curve():
+    dimer = from_hamiltonian(PT)
+    every = tmsopt.solve_all(tmsopt.Problem(dimer, fixed={"k": 1.0}, free={"g": (-3, 3)}, locate="EP2"))
+    assert every.complete
+    assert sorted(s.parameters["g"] for s in every.solutions) == pytest.approx([-1, 1], abs=EXACT)
+    (branch,) = tmsopt.trace(tmsopt.Problem(dimer, free={"g": (0.1, 3), "k": (0.1, 3)}, locate="EP2")).branches
+    assert np.abs(branch.parameters["g"] - branch.parameters["k"]).max() <= 1e-12
+    assert branch.eigenfrequency is not None
+    assert np.abs(branch.eigenfrequency["omega_re"]).max() <= 1e-12
+
+
+def pencil(n, seed):
+    rng = np.random.default_rng(seed)
+    parts = rng.integers(-200, 201, (2, 2, n, n))
+    H0, H1 = (a + 1j * b for a, b in parts)
+    entries = [
+        [f"({a} + (x + 1j*y)*({b}))/100" for a, b in zip(*rows, strict=True)] for rows in zip(H0, H1, strict=True)
+    ]
+    free = {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}
+    return tmsopt.Problem(from_hamiltonian(entries), free=free, locate="EP2"), H0, H1
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_all_points_of_a_pencil(n):
+    """The zeros of the discriminant, by balls: a resultant at n (n − 1) + 1 points, independent of the eigenvalues."""
+    problem, H0, H1 = pencil(n, seed=n)
+    discriminant = find_discriminant(problem.posed)
+    assert discriminant is not None
+    assert discriminant.degree == len(discriminant.zeros) == n * (n - 1)
+    every = tmsopt.solve_all(problem)
+    assert every.complete
+    assert all(every.proved)
+    inside = [z for z in discriminant.zeros if max(map(abs, z)) < 2]
+    assert len(every.solutions) == len(inside)
+    for solution in every.solutions:
+        z = complex(solution.parameters["x"], solution.parameters["y"])
+        p = flint.acb_mat([[flint.acb(a + z * b) for a, b in zip(*r, strict=True)] for r in zip(H0, H1, strict=True)])
+        with flint.ctx.workdps(60):
+            polynomial = p.charpoly()
+            slopes = [polynomial.derivative()(root) for root in polynomial.roots()]
+        size = float(np.linalg.norm(H0 + z * H1, 2)) ** (n - 1)
+        assert min(float(abs(x).mid()) for x in slopes) <= 1e-6 * size  # the root of the roundings of z
+
+
+def test_a_family_that_is_not_analytic_has_no_count():
+    problem = tmsopt.Problem(from_hamiltonian([["x", 1], ["1j*y", 0]]), free={"x": (-1, 1), "y": (-1, 1)}, locate="EP2")
+    assert find_discriminant(problem.posed) is None
+
+
+def test_a_long_chain_is_located_and_proved():
+    """Of Hatano and Nelson, with a complex energy at one end; the eigenvalues are those of NumPy."""
+    n = 30
+    H = [[0] * n for _ in range(n)]
+    for i in range(n - 1):
+        H[i][i + 1], H[i + 1][i] = "1.1", "0.9"
+    H[0][0] = "x + 1j*y"
+    problem = tmsopt.Problem(from_hamiltonian(H), free={"x": (-3, 3), "y": (0.1, 3)}, locate="EP2")
+    found = tmsopt.solve(problem)
+    matrix = np.array([[complex(str(e).replace("x + 1j*y", "0")) for e in row] for row in H])
+    matrix[0, 0] = complex(found.parameters["x"], found.parameters["y"])
+    s = np.linalg.eigvals(matrix)
+    gaps = np.abs(s[:, None] - s)[~np.eye(n, dtype=bool)]
+    assert gaps.min() < 1e-6  # one pair meets, to the root of the roundings
+    assert np.sort(gaps)[2] > 1e-3
+    assert tmsopt.prove(found).proved
+
+
+def test_an_exceptional_point_beside_a_diabolic_one_is_told_apart():
+    """[[i g, k], [k, −i g]] has an EP2 at g = k however small k is, and a diabolic point at g = k = 0."""
+    problem = tmsopt.Problem(from_hamiltonian(PT), fixed={"k": 1e-6}, free={"g": (-1.0, 1.0)}, locate="EP2")
+    found = tmsopt.solve(problem)
+    assert abs(abs(found.parameters["g"]) - 1e-6) <= 1e-20
+    assert found.to_json()["geometric_multiplicity"] == 1
+    assert math.isclose(found.abscissa, 0.0, abs_tol=1e-12)
