@@ -9,7 +9,7 @@ import pytest
 import tmsopt
 from tmsopt.chains import family_of, find_discriminant, find_point, measure_point, targets_of
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
-from tmsopt.problem.symmetry import find_symmetry
+from tmsopt.problem import find_symmetry
 
 EXACT = 1e-14  # some roundings
 

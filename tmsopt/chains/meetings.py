@@ -161,7 +161,7 @@ def _find_crossing(
             matrices, slopes = family.expand(p)
             value, slope = (scale * P for P in expand(matrices, z, 2))
             left, values, right = np.linalg.svd(value)
-            if count > len(values) or values[-count] > _NEARLY_SINGULAR:
+            if count > len(values) or values[-count] > max(_NEARLY_SINGULAR, reach):
                 break
             if values[-count] <= _ZERO_BLOCK:
                 return {**parameters, **dict(zip(family.names, p.tolist(), strict=True))}, z

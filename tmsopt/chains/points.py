@@ -144,9 +144,15 @@ def find_point(
     with np.errstate(all="ignore"):
         try:
             state = _gather(family, targets, np.clip(start, *family.box.T), rng)
-            return None if state is None else refine(family, targets, state.p, state.means, start, state.steps)
         except np.linalg.LinAlgError:
             return None
+        if state is None:
+            return None
+        try:
+            return refine(family, targets, state.p, state.means, start, state.steps)
+        except np.linalg.LinAlgError:  # an eigenvalue has several eigenvectors there
+            unknown = np.full(len(state.p), np.inf)
+            return ExceptionalPoint(state.p, (), np.inf, 0.0, unknown, (state.steps, 0))
 
 
 def gather_roots(family: Family, targets: Sequence[Target]) -> tuple[complex, ...] | None:

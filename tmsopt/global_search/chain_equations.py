@@ -126,7 +126,7 @@ class ChainEquations:
 
     def _parts(self, target: int, values: Sequence[Any]) -> list[Any]:
         """The real equations of complex values F₀ … F₍ₖ₋₁₎ of one target."""
-        used = [(j, values[j]) for j in self._used(target)]
+        used = [(j, values[j]) for j in self._value_indices(target)]
         if self.phases:  # a distance t along the imaginary axis is i times a real number
             z = flint.acb(self.phases[target].real, -self.phases[target].imag)
             return [(z * flint.acb(0, 1) ** j * x).real for j, x in used]
@@ -149,13 +149,13 @@ class ChainEquations:
             sizes[j]
             for k, sizes in enumerate(self.sizes)
             for _ in range(1 if self._has_real_equations(k) else 2)
-            for j in self._used(k)
+            for j in self._value_indices(k)
         ]
 
     def _has_real_equations(self, target: int) -> bool:
         return bool(self.phases) or self.targets[target].is_real(self.is_complex)
 
-    def _used(self, target: int) -> range:
+    def _value_indices(self, target: int) -> range:
         """The j of the F_j that are not 0 by symmetry: about 0, every second one if the eigenvalues are symmetric."""
         order, is_centred = self.targets[target].order, self.targets[target].axis == "zero" and self.is_complex
         return range(order % 2, order, 2) if is_centred else range(order)

@@ -12,6 +12,7 @@ from .problem import Posed as Posed, Problem as Problem
 from .quantities import NO_RADIUS as NO_RADIUS, ROOT_NAMES as ROOT_NAMES
 from .searches import Starts as Starts, expected_unseen as expected_unseen, expects_few_better as expects_few_better
 from .solution import Bound as Bound, Solution as Solution
+from .symmetry import find_symmetry as find_symmetry
 from .unit_system import (
     Unit as Unit, amounts_text as amounts_text, rate_of as rate_of, show_at as show_at, unit_at as unit_at,
     unit_of as unit_of, common_unit as common_unit, units_of as units_of,

@@ -256,7 +256,15 @@ class SchurForm:
 
 
 def schur_form(matrix: Complex, is_complex: bool) -> SchurForm:
-    """The Schur form of a matrix, which may be real."""
+    """The Schur form of a matrix, which may be real.
+
+    Example:
+        >>> form = tmsopt.roots.schur_form(np.array([[0, 1], [-1, 0]], dtype=complex), is_complex=False)
+        >>> sorted(form.eigenvalues.imag.tolist())
+        [-1.0, 1.0]
+
+    More: docs/explanation/jordan_chains.md
+    """
     from scipy.linalg import schur
 
     T, Q = schur(matrix, output="complex")

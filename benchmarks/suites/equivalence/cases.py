@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 PROBLEMS = Path(__file__).resolve().parents[3] / "problems"
+_NEWER = {"passive_dimer", "pt_dimer", "ring_of_modes"}
+"""Files that the version of the net did not have."""
 
 EACH = 60
 """Random problems of each kind."""
@@ -82,7 +84,7 @@ _COMMANDS = (
 
 def _commands() -> list[Case]:
     """Commands on files, their helps and what they say of wrong usage."""
-    files = sorted(path.stem for path in PROBLEMS.glob("*.toml"))
+    files = sorted({path.stem for path in PROBLEMS.glob("*.toml")} - _NEWER)
     cases = [
         Case(f"{name}/{file}", tuple(f"{file}.toml" if word == "FILE" else word for word in words), seeded)
         for file in files
@@ -106,7 +108,7 @@ def _commands() -> list[Case]:
 def _functions() -> list[Case]:
     """Cases that a function answers, in a process with others."""
     random = [Case(f"{kind}/{number:02d}") for kind in KINDS for number in range(EACH)]
-    files = sorted(path.stem for path in PROBLEMS.glob("*.toml"))
+    files = sorted({path.stem for path in PROBLEMS.glob("*.toml")} - _NEWER)
     faults = [Case(f"fault/{file}/{number}") for file in files for number in range(FAULTS)]
     return [*random, *faults, Case("signatures/all"), Case("calls/all")]
 
