@@ -149,7 +149,8 @@ def find_point(
         if state is None:
             return None
         try:
-            return refine(family, targets, state.p, state.means, start, state.steps)
+            point = refine(family, targets, state.p, state.means, start, state.steps)
+            return point if point.is_found else replace(point, p=state.p)
         except np.linalg.LinAlgError:  # an eigenvalue has several eigenvectors there
             unknown = np.full(len(state.p), np.inf)
             return ExceptionalPoint(state.p, (), np.inf, 0.0, unknown, (state.steps, 0))
