@@ -20,6 +20,7 @@ from tmsopt.boundaries.rays import (
 )
 from tmsopt.boundaries.weighted_design import WeightedDesign, weight_design
 from tmsopt.errors import InputError, input_error, suggest, table_faults
+from tmsopt.problem.evaluate import require_polynomial
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
@@ -255,7 +256,7 @@ def _find_stabilising_zeros(base: WeightedDesign) -> tuple[str, ...]:
 
 
 def _weight_given_design(design: ProblemSource, parameters: Numbers | None, weights: Numbers | None) -> WeightedDesign:
-    problem = pose(design)
+    problem = require_polynomial(pose(design))
     tables = {"parameters": (parameters, "{'Fr': 1.2, 'mu': 0.1}"), "weights": (weights, "{'lambda_s': 0.01}")}
     if faults := [f for n, (x, example) in tables.items() if x is not None for f in table_faults(n, x, example)]:
         raise InputError(faults)

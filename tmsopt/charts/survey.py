@@ -16,7 +16,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.errors import Fault, InputError, input_error, list_faults, short, suggest, table_faults
 from tmsopt.problem.advice.names import example_of
-from tmsopt.problem.evaluate import ArrayFunction, array_function, find_eigenvalues, parse_all
+from tmsopt.problem.evaluate import ArrayFunction, array_function, find_eigenvalues, parse_all, require_polynomial
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_NAMES
@@ -161,6 +161,8 @@ class Survey:
         with np.errstate(all="ignore"):  # overflow counts as undefined
             values = self.formulas(columns)
             coefficients = [np.broadcast_to(values[n], shape) for n in model.coefficient_names() if n in values]
+            if {"kind", "real_roots", "abscissa", "damping_ratio"} & layers or self.root_formulas.names:
+                require_polynomial(self.problem)
             if {"kind", "real_roots"} & layers:
                 values |= vars(classify(coefficients))
             if self.root_formulas.names or {"abscissa", "damping_ratio"} & layers:

@@ -15,6 +15,7 @@ from tmsopt.boundaries.weighted_design import parameter_faults
 from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, find_crossings, user_crossings
 from tmsopt.errors import InputError, input_error, short, suggest
 from tmsopt.models import ParameterSet
+from tmsopt.problem.evaluate import require_polynomial
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
@@ -129,7 +130,7 @@ def speeds(
 
     More: docs/explanation/weave_and_capsize.md
     """
-    posed = pose(problem if problem is not None and isinstance(design, Mapping) else design)
+    posed = require_polynomial(pose(problem if problem is not None and isinstance(design, Mapping) else design))
     nominal = posed.nominal
     parameter_set = nominal.parameter_set
     name = parameter if parameter is not None else speed_of(parameter_set)

@@ -16,6 +16,7 @@ from tmsopt.explorer.javascript import kernel_script, model_script
 from tmsopt.explorer.page_data import make_page_data
 from tmsopt.files import as_path, write_text
 from tmsopt.problem import Posed, Problem, ProblemSource, Solution, pose
+from tmsopt.problem.evaluate import require_polynomial
 from tmsopt.problem.toml import read_page
 from tmsopt.program.options import CommonOptions
 from tmsopt.progress import start_steps
@@ -94,7 +95,7 @@ def explore(problem: ProblemSource, **options: Unpack[CommonOptions]) -> Explore
     """
     listener = options.get("progress")
     model = read_page(problem, "problem").data.get("model") if isinstance(problem, str | PathLike) else None
-    posed, solution = pose(problem), problem if isinstance(problem, Solution) else None
+    posed, solution = require_polynomial(pose(problem)), problem if isinstance(problem, Solution) else None
     if solution is None:
         if posed.pareto:
             posed = posed.derive(pareto=(), minimize=posed.pareto[0])

@@ -28,6 +28,7 @@ from tmsopt.problem import (
     unit_of,
 )
 from tmsopt.problem.dependence import sense_notes
+from tmsopt.problem.evaluate import require_polynomial
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.problem.symmetry import find_symmetry
 from tmsopt.problem.verdict.stability import stability
@@ -129,6 +130,7 @@ def solve_any_status(
         and (outcome := locate_by_chains(problem, options, extra_starts))
     ):
         return _assemble(problem, outcome, sense_notes(problem), {}, began, with_bound)
+    require_polynomial(problem)
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
     states = [
         s for s in begin_search(problem, options, tuple(extra_starts), policy.tuning) if s.side not in skipped_parts

@@ -21,6 +21,7 @@ from tmsopt.errors import (
     table_faults,
 )
 from tmsopt.models.user_spectrum import pattern_of, patterns_of
+from tmsopt.problem.evaluate import require_polynomial
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
@@ -78,7 +79,7 @@ def trace(
     More: docs/how_to/tracing.md
     """
     started = time.perf_counter()
-    problem, checked_events = locate_pattern(pose(problem), pattern), check_events(events)
+    problem, checked_events = locate_pattern(require_polynomial(pose(problem)), pattern), check_events(events)
     counts = ("starts", starts, 0, MOST_STARTS), ("seed", seed, 0, None), ("most", most, _MIN_POINTS, None)
     check_options(problem, step, *counts, through=through, progress=progress)
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
