@@ -152,6 +152,35 @@ def test_symmetric_matrices_with_constant_damping_give_pi():
     assert phases(loop) == [pytest.approx(math.pi, abs=1e-9)]
 
 
+@pytest.mark.parametrize(
+    ("model", "value"),
+    [
+        (from_matrices(A=[[0, "x + 1j*y"], [1, 0]]), 0),
+        (from_matrices(M=[[1]], D=[["2j"]], K=[["x + 1j*y - 1"]]), 1),
+    ],
+)
+def test_complex_matrices_have_eigenfrequencies(model, value):
+    """s² = z and (s + i)² = −z for z = x + i y; ω = i s."""
+    loop = encircle(plane(model, "x", "y"), 1.0)
+    assert (loop.permutation, loop.winding, loop.is_complete) == ((1, 0), 1, True)
+    assert phases(loop) == [pytest.approx(math.pi, abs=1e-9)]
+    assert loop.inside[0].eigenvalue == pytest.approx(value, abs=1e-9)
+
+
+def test_a_large_chain():
+    """40 modes, the first two of which are separate: an EP2 at d = 0, k = 0.4, as in the dimer."""
+    H = [[0.0] * 40 for _ in range(40)]
+    for i in range(2, 40):
+        H[i][i] = 5 + 0.1 * i
+        if i < 39:
+            H[i][i + 1] = H[i + 1][i] = 0.3
+    H[0][0], H[1][1], H[0][1], H[1][0] = "d - 1j", "-0.2j", "k", "k"
+    loop = encircle(plane(from_hamiltonian(H), "d", "k"), 0.1, centre={"d": 0.0, "k": 0.4}, starts=2)
+    assert [c.members for c in loop.cycles if c.turns > 1] == [(0, 1)]
+    assert (loop.phase, loop.winding, loop.is_complete) == (pytest.approx(math.pi, abs=1e-9), 1, True)
+    assert loop.inside[0].eigenvalue == pytest.approx(-0.6j, abs=1e-7)
+
+
 def test_eigenvalues_that_coincide_on_the_loop_are_reported_with_their_place():
     with pytest.raises(
         tmsopt.InputError, match=r"radius: two eigenvalues coincide on the circle, at d = \S+, k = 0\.4"

@@ -67,7 +67,7 @@ class EnclosedPoint:
 
     Attributes:
         parameters: values of the two parameters.
-        eigenvalue: the multiple eigenvalue: ω for a complex H, otherwise s.
+        eigenvalue: the multiple eigenvalue: ω for a complex system, otherwise s.
         name: ``EP2`` for two eigenvalues, or ``CEP2`` for two complex pairs of real matrices.
         order: how many eigenvalues coincide.
         winding: its part of the winding number of the loop; None if it lies on a curve of such points.
@@ -96,7 +96,7 @@ class Loop(Printable):
         parameters: every parameter at the centre.
         radius: radius of the circle in SI units and rad, or in the model's own units.
         angles: angles along the circle, from 0 to 2π.
-        eigenvalues: ω for a complex H, numbered by their real parts; otherwise s with Im s >= 0, numbered from the
+        eigenvalues: ω for a complex system, numbered by their real parts; otherwise s with Im s >= 0, numbered from the
             right to the left. A row for each angle; each column is continuous.
         permutation: eigenvalue k becomes eigenvalue permutation[k] after one turn.
         cycles: the cycles of the permutation, with their phases.

@@ -62,7 +62,7 @@ class ParameterPlane:
         return M if model.is_complex else M.real
 
     def user_values(self, s: Complex) -> Complex:
-        """The eigenvalues that the user sees: ω = i s for a complex H."""
+        """The eigenvalues that the user sees: ω = i s for a complex system."""
         return 1j * s if self.problem.model.is_complex else s
 
 

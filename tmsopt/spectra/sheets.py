@@ -31,8 +31,8 @@ class Sheets(Tabular):
         problem: the problem in which only these two parameters are free.
         parameters: every parameter at the exceptional point, or at the start or the middle of the ranges.
         grid: the values along the horizontal and the vertical axis.
-        values: ω for a complex H, otherwise s; shape (rows, columns, n). The first index belongs to the vertical axis,
-            and the last one is in the order of the real parts. It is nan where the matrices are not defined.
+        values: ω for a complex system, otherwise s; shape (rows, columns, n). The first index belongs to the vertical
+            axis, and the last one is in the order of the real parts. It is nan where the matrices are not defined.
         multiple: the multiple eigenvalues at `parameters`, if the problem locates a pattern.
 
     Example:
@@ -56,7 +56,7 @@ class Sheets(Tabular):
 
     @property
     def letter(self) -> str:
-        """The name of the eigenvalues: ``omega`` for a complex H, otherwise ``root``."""
+        """The name of the eigenvalues: ``omega`` for a complex system, otherwise ``root``."""
         return "omega" if self.problem.model.is_complex else "root"
 
     @property
