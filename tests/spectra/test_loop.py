@@ -190,6 +190,15 @@ def test_eigenvalues_that_coincide_on_the_loop_are_reported_with_their_place():
         encircle(plane(from_matrices(A=[[0, 1], ["-k", "-c"]]), "c", "k"), 0.5, centre={"c": 2.0, "k": 1.0})
 
 
+@pytest.mark.parametrize(
+    "H", [[["x + 1j*y", 0], [0, "x + 1j*y"]], [["x", 0], [0, "(x + abs(x))/2 + 1j*y - 1j*abs(y)"]]]
+)
+def test_eigenvalues_that_coincide_along_an_arc_end_the_work(H):
+    """Everywhere, or where x and y are positive."""
+    with pytest.raises(tmsopt.InputError, match="two eigenvalues coincide"):
+        encircle(plane(from_hamiltonian(H), "x", "y"), 1.0)
+
+
 def test_a_curve_of_real_double_roots_inside_has_no_winding_number():
     """A = [[x, 1 − x² − y²], [1, −x]] has s² = 1 − y²: no; with s² = x² + y² − 1 the circle x² + y² = 1 is inside."""
     loop = encircle(plane(from_matrices(A=[[0, "x**2 + y**2 - 1"], [1, 0]]), "x", "y"), 2.0)
@@ -201,7 +210,7 @@ def test_a_curve_of_real_double_roots_inside_has_no_winding_number():
 
 def test_a_small_loop_and_few_points_are_enough():
     """Also where the loop passes a point at a distance of 1e-5 radii."""
-    for radius in (1e-5, 1e-9):
+    for radius in (1e-5, 1e-8):
         assert encircle(DIMER, radius, points=8, starts=0).permutation == (1, 0)
     assert encircle(cubic(), 1.99998, centre={"x": 0.0}, points=8).permutation == (0, 1, 2)
     assert encircle(cubic(), 2.00002, centre={"x": 0.0}, points=8).winding == 2
@@ -233,6 +242,7 @@ WRONG = [
     (lambda: encircle(tmsopt.Problem(from_hamiltonian([["x", 1], [1, "2j"]]), free={"x": (0, 1)})), "found 1"),
     (lambda: encircle(plane(from_coefficients([1, "c", "k"]), "c", "k")), "accepted: matrices"),
     (lambda: encircle(DIMER, 0), "radius: found 0; accepted: a positive number"),
+    (lambda: encircle(DIMER, 1e-12), "radius: found 1e-12; accepted: 4e-09 or more"),
     (lambda: encircle(DIMER, plane="dk"), "plane: found 'dk'; accepted: two of d k"),
     (lambda: encircle(DIMER, plane=("d", "d")), "plane: found"),
     (lambda: encircle(DIMER, plane=("d", 3)), "plane: found"),

@@ -59,7 +59,7 @@ def write_loop(loop: Loop, level: Level) -> Parts:
 def write_sheets(sheets: Sheets, level: Level) -> Parts:
     """Write the grid, and the multiple eigenvalues."""
     nouns, problem, (columns, rows) = _name_eigenvalues(sheets.problem), sheets.problem, map(len, sheets.grid)
-    count, size = sheets.values.shape[2], _ROUNDING * float(np.nanmax(np.abs(sheets.values)))
+    count, size = sheets.values.shape[2], _ROUNDING * float(np.nanmax(np.abs(sheets.values), initial=0.0))
     grid = f"{columns}×{rows} points over {' and '.join(sheets.axes)}"
     yield count_things(count, "sheet"), grid
     yield Sentence(f"{count_things(count, 'sheet')} of {nouns}, {grid}", tone="answer")

@@ -9,7 +9,7 @@ import numpy as np
 
 from tmsopt.algebra.sequence import golden_steps
 from tmsopt.chains import family_of, find_point, targets_of
-from tmsopt.errors import MOST_STARTS, Fault, InputError, callback_faults, count_faults, is_number, short
+from tmsopt.errors import MOST_STARTS, Fault, InputError, callback_faults, count_faults, input_error, is_number, short
 from tmsopt.problem import NotSolved, Problem, ProblemSource, units_of
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Complex, Printable, Table, plain
@@ -23,6 +23,7 @@ STARTS = 16
 """Default number of starts of the search for exceptional points inside a loop."""
 
 _POINTS_RANGE = (8, 10_000)
+_MIN_RADIUS = 1e-8  # least radius, as a share of the largest parameter: rounding deforms smaller circles
 _SAME_POINT = 1e-3  # two points are one if their distance is below this share of the radius
 _SAME_VALUE = 1e-2  # and if their eigenvalues differ by less than this share of the spread of all eigenvalues
 _SMALL_LOOP = 1e-2  # largest radius of the loop around a single point, in radii
@@ -200,6 +201,8 @@ def encircle(
     base = plane_of(problem, "plane", plane, centre, progress, faults)
     if base.solution and base.solution.status != "optimal":
         raise NotSolved(base.solution)
+    if radius < (least := _MIN_RADIUS * np.abs(base.centre).max()):
+        raise input_error(f"found {radius:.3g}; accepted: {least:.3g} or more, because of rounding", "radius")
     path = follow(base, base.centre, radius, points)
     size = float(np.abs(path.values - path.values.mean()).max())
     start_steps(progress, "searching inside the loop")

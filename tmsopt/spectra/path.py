@@ -19,6 +19,7 @@ _MAX_TURN = 0.5  # largest difference of y(t) x(t + h) y(t + h) x(t) from 1
 _MIN_STEP = 1e-8  # least angle between two points; if more are needed, two eigenvalues coincide on the circle
 _PHASE_TOLERANCE = 1e-9  # change of the phases, if the steps are halved, that ends their improvement
 _MAX_EIGENVALUES = 20_000  # number of eigenvalues at all points that ends it too
+_MAX_UNCLEAR = 100_000  # the same number, at which eigenvalues that are not assigned coincide along an arc
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ def follow(plane: ParameterPlane, centre: Array, radius: float, points: int) -> 
                 break
             logs = finer
             chosen[:] = True
-        elif steps.min() < _MIN_STEP:
+        elif steps.min() < _MIN_STEP or nearest.size >= _MAX_UNCLEAR:
             raise input_error(_describe_coincidence(plane, *place(states[0][steps.argmin()])), "radius")
         added = compute(states[0][chosen] + steps[chosen] / 2)
         order = np.argsort(np.concatenate([states[0], added[0]]))
