@@ -38,6 +38,8 @@ def laser(free, **fixed):
 TWO = complex(1 + math.cos(math.pi - 2), -math.sin(2))
 PUBLISHED = {
     "loss_only_dimer": ({"k": 0.4, "d": 0}, -0.6j, 2),
+    "pt_dimer": ({"g": 1}, 0j, 2),
+    "passive_dimer": ({"g": 2}, 5 - 1j, 2),
     "pt_trimer": ({"gain": math.sqrt(2), "loss": math.sqrt(2), "d1": 0, "d3": 0}, 0j, 3),
     "ep3_sensor": ({"gain": math.sqrt(2), "loss": math.sqrt(2), "d1": 0, "d3": 0}, 0j, 3),
     "ring_backscattering": ({"r": -math.cos(2), "s": math.sin(2)}, TWO, 2),
@@ -61,6 +63,17 @@ def test_published_exceptional_points_are_located_and_proved(name):
     assert [z.multiplicity for z in proof.eigenfrequencies] == [order]
     (diagnosis,) = tmsopt.diagnose(found)
     assert (diagnosis.algebraic, diagnosis.geometric, diagnosis.kind) == (order, 1, "defective")
+
+
+def test_a_ring_of_modes_has_its_point_at_the_closed_form():
+    """g = (sqrt((b + c)² − 4 a²) − (b − c))/2 with ω = 0, by the constant term of the polynomial; others are simple."""
+    found = tmsopt.solve("problems/ring_of_modes.toml")
+    a, b, c = (found.parameters[n] for n in "abc")
+    assert abs(found.parameters["g"] - (math.sqrt((b + c) ** 2 - 4 * a**2) - (b - c)) / 2) < EXACT
+    (double,) = (root for root in found.eigenfrequencies if root.multiplicity == 2)
+    assert abs(complex(double.re, double.im)) < EXACT
+    assert (len(found.eigenfrequencies), found.conditions) == (3, {"real": 2, "by_symmetry": 1})
+    assert tmsopt.prove(found).proved
 
 
 @pytest.mark.parametrize(
