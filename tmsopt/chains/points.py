@@ -19,6 +19,7 @@ from tmsopt.roots.chains import (
     MIN_SECOND_VALUE,
     Chain,
     Cluster,
+    eigenvalues_of,
     find_borders,
     linearise,
     linearised_slopes,
@@ -159,12 +160,11 @@ def find_point(
 def gather_roots(family: Family, targets: Sequence[Target]) -> tuple[complex, ...] | None:
     """The means of the eigenvalues that come nearest to the targets, for a family without parameters."""
     try:
-        state = _gather(family, targets, np.empty(0), None)
+        groups = _choose_groups(eigenvalues_of(family.matrices(np.empty(0))), targets, family, None)
     except np.linalg.LinAlgError:
         return None
-    if state is None:
-        return None
-    return tuple(_project(s, target) for s, target in zip(state.means, targets, strict=True))
+    means = [complex(group.mean()) for group in groups if group is not None]
+    return tuple(map(_project, means, targets)) if len(means) == len(targets) else None
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from tmsopt.errors import MOST_POINTS, MOST_STARTS, input_error
 _KEYS = (
     "schema title model status objective parameters units abscissa abscissa_realised stable any_stable verdict growth "
     "verdict_is_exact multiplicity_is_exact defective geometric_multiplicity roots eigenfrequencies structure active "
-    "violations missed_as_stored bound starts seconds inertia_margin relaxation worst_case notes interrupted"
+    "violations missed_as_stored conditions bound starts seconds inertia_margin relaxation worst_case notes interrupted"
 )
 """Keys of the JSON without --full, which other programs rely on."""
 
