@@ -132,28 +132,40 @@ def test_all_points_of_a_pt_dimer_and_its_curve():
     assert np.abs(branch.eigenfrequency["omega_re"]).max() <= 1e-12
 
 
-def pencil(n, seed):
+def test_irrational_constants_are_proved_with_all_numbers():
+    """At g = k = √2 the double eigenfrequency is 0; a ball around 0 has a square."""
+    dimer = tmsopt.Problem(from_hamiltonian(PT), fixed={"k": "sqrt(2)"}, free={"g": (0.1, 3)}, locate="EP2")
+    proof = tmsopt.prove(dimer)
+    assert proof.proved
+    assert proof.abscissa is not None
+    assert abs(float(proof.abscissa.value)) < 1e-30
+    assert [root.multiplicity for root in proof.eigenfrequencies] == [2]
+
+
+def pencil(n, seed, low):
     rng = np.random.default_rng(seed)
     parts = rng.integers(-200, 201, (2, 2, n, n))
     H0, H1 = (a + 1j * b for a, b in parts)
     entries = [
         [f"({a} + (x + 1j*y)*({b}))/100" for a, b in zip(*rows, strict=True)] for rows in zip(H0, H1, strict=True)
     ]
-    free = {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}
+    free = {"x": (low, 2.0), "y": (low, 2.0)}
     return tmsopt.Problem(from_hamiltonian(entries), free=free, locate="EP2"), H0, H1
 
 
-@pytest.mark.parametrize("n", [2, 3, 4])
-def test_all_points_of_a_pencil(n):
+@pytest.mark.parametrize(("n", "low"), [(2, -2.0), (3, -2.0), (3, 0.0), (4, -2.0)])
+def test_all_points_of_a_pencil(n, low):
     """The zeros of the discriminant, by balls: a resultant at n (n − 1) + 1 points, independent of the eigenvalues."""
-    problem, H0, H1 = pencil(n, seed=n)
+    problem, H0, H1 = pencil(n, seed=n, low=low)
     discriminant = find_discriminant(problem.posed)
     assert discriminant is not None
     assert discriminant.degree == len(discriminant.zeros) == n * (n - 1)
     every = tmsopt.solve_all(problem)
     assert every.complete
     assert all(every.proved)
-    inside = [z for z in discriminant.zeros if max(map(abs, z)) < 2]
+    assert every.completeness is not None
+    assert every.completeness.total == n * (n - 1)
+    inside = [z for z in discriminant.zeros if all(low < x < 2 for x in z)]
     assert len(every.solutions) == len(inside)
     for solution in every.solutions:
         z = complex(solution.parameters["x"], solution.parameters["y"])

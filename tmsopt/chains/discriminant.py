@@ -45,6 +45,8 @@ def find_discriminant(problem: Posed) -> Discriminant | None:
     x, y = (symbol(n) for n in problem.free)
     parameters = problem.ordered({**problem.as_nodes(problem.fixed), **dict(zip(problem.free, (x, y), strict=True))})
     matrices = model.pencil(problem.parameter_set.native(parameters))
+    if len(matrices) != 2:
+        return None
     ratio = Fraction(0)
     for k, rows in enumerate(matrices):
         for entry in (entry for row in rows for entry in row if isinstance(entry, Pair)):

@@ -157,6 +157,15 @@ def find_point(
             return ExceptionalPoint(state.p, (), np.inf, 0.0, unknown, (state.steps, 0))
 
 
+def refine_near(family: Family, targets: Sequence[Target], p: Array) -> ExceptionalPoint | None:
+    """The point next to a design, by the second stage alone, in the box or outside; None if it fails."""
+    means = gather_roots(family.at(p), targets)
+    try:
+        return None if means is None else refine(family, targets, p, means)
+    except np.linalg.LinAlgError:
+        return None
+
+
 def gather_roots(family: Family, targets: Sequence[Target]) -> tuple[complex, ...] | None:
     """The means of the eigenvalues that come nearest to the targets, for a family without parameters."""
     try:

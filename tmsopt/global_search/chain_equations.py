@@ -222,8 +222,13 @@ def has_chain_proof(problem: Posed, name: str) -> bool:
     return True
 
 
-def build_chain_equations(problem: Posed, pattern: Pattern, parameters: Numbers) -> ChainEquations:
+def build_chain_equations(
+    problem: Posed, pattern: Pattern, parameters: Numbers, uses_symmetry: bool = True
+) -> ChainEquations:
     """Build the equations of the chains of a pattern, near a stored design.
+
+    Args:
+        uses_symmetry: whether the fixed parameters have exactly the values of the problem, whose symmetry is known.
 
     Raises:
         ProofFailed: if the design has no such chains.
@@ -234,7 +239,9 @@ def build_chain_equations(problem: Posed, pattern: Pattern, parameters: Numbers)
     if point is None or not point.is_defective:
         raise ProofFailed(f"no Jordan chains of {pattern.name} near the design: eigenvalues have several eigenvectors")
     borders = tuple(tuple(map(_column, chain.borders)) for chain in point.chains)
-    symmetry, phases = _usable_symmetry(problem, point, family.typical_size), tuple[complex, ...]()
+    is_as_posed = uses_symmetry and all(parameters[n] == x for n, x in problem.fixed.items())
+    symmetry = _usable_symmetry(problem, point, family.typical_size) if is_as_posed else NONE
+    phases = tuple[complex, ...]()
     roots = point.roots
     if symmetry != NONE:
         roots = tuple(

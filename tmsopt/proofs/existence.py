@@ -95,8 +95,13 @@ def prove_nearby(
     Raises:
         ProofFailed: if the proof fails; the message gives the reason.
     """
-    build = build_chain_equations if has_chain_proof(problem, pattern.name) else build_equations
-    system, working_digits = build(problem, pattern, stored_values), digits + _EXTRA_DIGITS
+    working_digits = digits + _EXTRA_DIGITS
+    system: AnyEquations
+    if has_chain_proof(problem, pattern.name):
+        changed = set(design.given_exactly) & set(problem.fixed) - set(problem.typed(stored_values))
+        system = build_chain_equations(problem, pattern, stored_values, uses_symmetry=not changed)
+    else:
+        system = build_equations(problem, pattern, stored_values)
     for _ in range(_MAX_ATTEMPTS):
         with flint.ctx.workdps(working_digits):
             proved_design = _search_nearby(system, design, stored_values, working_digits - _EXTRA_DIGITS // 2)
@@ -213,7 +218,8 @@ def _factorise(system: ChainEquations, coefficients: Sequence[Any], solution: Ma
     rest = [c / coefficients[0] for c in coefficients]  # empty for large matrices
     factors = list[tuple[list[Any], int]]()
     for s, target in zip(system.eigenvalues(solution), system.targets, strict=True):
-        square = s.real**2 + (s.imag - system.problem.model.carrier) ** 2
+        height = s.imag - system.problem.model.carrier
+        square = s.real * s.real + height * height  # a power of a ball around 0 would be nan
         is_real = target.is_real(system.problem.model.is_complex)
         factor = [flint.arb(1), -s.real] if is_real else [flint.arb(1), -2 * s.real, square]
         factors.append((factor, target.order))

@@ -7,7 +7,7 @@ import numpy as np
 
 from tmsopt.algebra.balls import number
 from tmsopt.algebra.krawczyk import Enclosure
-from tmsopt.chains import family_of, find_discriminant, find_point, targets_of
+from tmsopt.chains import family_of, find_discriminant, refine_near, targets_of
 from tmsopt.global_search import Completeness
 from tmsopt.global_search.chain_equations import prove_point
 from tmsopt.problem import Posed
@@ -30,7 +30,7 @@ def prove_all_points(problem: Posed) -> Completeness | None:
     proved = list[Enclosure]()
     with flint.ctx.workdps(_WORK_DIGITS):
         for zero in discriminant.zeros:
-            point = find_point(family, targets, np.array(zero))
+            point = refine_near(family, targets, np.array(zero))
             if point is None or not point.is_found:
                 return None
             enclosure = prove_point(problem, dict(zip(problem.free, point.p.tolist(), strict=True)))
