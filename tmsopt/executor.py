@@ -12,7 +12,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Sequence
-from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
@@ -224,6 +224,8 @@ def _call(pickled_function: bytes, items: bytes) -> bytes:
 class _ProcessPool:
     """Processes of this machine. A thread of this process sends calls to each of them. A process that ends is replaced.
 
+    The threads are daemons: Ctrl-C within a lock of Python's library leaves it locked, and a thread may wait for it.
+
     `submit` gives the future of a call in a worker. `result` gives its result, or raises its exception or
     `_WorkerEnded`. `check_workers` is called about once a second, and `end` ends all calls and workers. `workers` is
     the number of workers.
@@ -231,12 +233,17 @@ class _ProcessPool:
 
     def __init__(self, workers: int) -> None:
         self.workers, self._lock = workers, threading.Lock()
-        self._threads: ThreadPoolExecutor | None = None
+        self._calls: SimpleQueue[Any] | None = None
         self._running, self._idle = list[KillableProcess](), list[KillableProcess]()
 
     def submit(self, *call: Any) -> Any:
-        self._threads = self._threads or ThreadPoolExecutor(self.workers)
-        return self._threads.submit(self._answer, *call)
+        if self._calls is None:
+            self._calls = SimpleQueue()
+            for _ in range(self.workers):
+                threading.Thread(target=self._serve, args=(self._calls,), daemon=True).start()
+        future = Future[Any]()
+        self._calls.put((future, call))
+        return future
 
     def result(self, future: Any) -> Any:
         return future.result()
@@ -245,12 +252,24 @@ class _ProcessPool:
 
     def end(self) -> None:
         with self._lock:
-            threads, self._threads = self._threads, None
+            calls, self._calls = self._calls, None
             running, self._running, self._idle = self._running, [], []
-        if threads is not None:
-            threads.shutdown(wait=False, cancel_futures=True)
+        if calls is not None:
+            with suppress(Empty):
+                while True:
+                    calls.get_nowait()
+            for _ in range(self.workers):
+                calls.put(None)
         for process in running:
             process.end()
+
+    def _serve(self, calls: SimpleQueue[Any]) -> None:
+        """Answer calls until the pool ends."""
+        for future, call in iter(calls.get, None):
+            try:
+                future.set_result(self._answer(*call))
+            except Exception as error:
+                future.set_exception(error)
 
     def _answer(self, *call: Any) -> Any:
         try:
@@ -269,7 +288,7 @@ class _ProcessPool:
         cause = ""
         for _ in range(_START_TRIES):
             with self._lock:
-                if self._threads is None:  # the pool has ended
+                if self._calls is None:  # the pool has ended
                     raise _WorkerEnded(cause)
                 process = KillableProcess()
                 self._running.append(process)
