@@ -197,7 +197,7 @@ def test_the_law_holds_farther_on_one_side():
 def test_a_crossing_that_is_met_to_less_than_its_digits_moves_linearly():
     """[[d, k], [k, −d]] has ω = ±√(d² + k²): a double root at d = k = 0 alone, which coefficients meet to their root."""
     free = {"d": (-1, 1), "k": (-1, 1)}
-    diagnosis = diagnosis_within(from_hamiltonian([["d", "k"], ["k", "-d"]]).within(free), free, d=-6.5e-10, k=-3.1e-10)
+    diagnosis = diagnosis_within(from_hamiltonian([["d", "k"], ["k", "-d"]]), free, d=-6.5e-10, k=-3.1e-10)
     assert (diagnosis.kind, diagnosis.eigenfrequency) == ("semisimple", 0)
     for answer in diagnosis.responses:
         (law,) = answer.laws
@@ -218,7 +218,7 @@ def test_equal_oscillators_that_are_met_to_their_sixth_digit_move_linearly():
 def test_a_singular_exceptional_point_moves_linearly():
     """[[a + ib, 1], [0, 0]] has ω = a + ib and 0, one Jordan block at a = b = 0."""
     free = {"a": (-1, 1), "b": (-1, 1)}
-    diagnosis = diagnosis_within(from_hamiltonian([["a + 1j*b", 1], [0, 0]]).within(free), free, a=5.2e-8, b=6e-30)
+    diagnosis = diagnosis_within(from_hamiltonian([["a + 1j*b", 1], [0, 0]]), free, a=5.2e-8, b=6e-30)
     assert (diagnosis.geometric, diagnosis.eigenfrequency) == (1, 0)
     for answer in diagnosis.responses:
         (law,) = answer.laws

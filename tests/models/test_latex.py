@@ -74,4 +74,4 @@ def test_matplotlib_sets_it(name):
 
 def test_a_page_is_the_most():
     assert whipple._repr_latex_() is None
-    assert tmsopt.models.from_hamiltonian([["w", "k"], ["k", "-w"]])._repr_latex_().startswith("$$s^{")
+    assert tmsopt.models.from_hamiltonian([["w", "k"], ["k", "-w"]])._repr_latex_() is None

@@ -11,9 +11,10 @@ from tmsopt.analysis.root_point import RootPoint, evaluate_pencil, high_precisio
 from tmsopt.analysis.sensitivity import measure_sensitivity, sensitivity_to_json
 from tmsopt.analysis.splitting import DEVIATION, Law, Response, compute_response
 from tmsopt.models import Model, ParameterSet
-from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
+from tmsopt.models.user_spectrum import eigenfrequencies
 from tmsopt.problem.evaluate import evaluate_matrices
 from tmsopt.problem.files import ProblemSource
+from tmsopt.problem.real_form import has_real_form
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Numbers, Printable, plain
 from tmsopt.roots import Root, Structure, backward_error
@@ -104,11 +105,11 @@ def diagnose(design: ProblemSource, *, progress: Listener | None = None) -> tupl
     start_steps(progress, "splitting roots")
     problem = solution.problem.posed
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
-    values, structure = problem.values(parameters), solution.of_polynomial
+    values, structure = problem.values(parameters), Structure(solution.structure, solution.roots, 0.0)
     structure_at_design = values["structure"]
     assert isinstance(structure_at_design, Structure)
     # to satisfy a limit, the stored parameters may differ slightly from those at which the roots are multiple
-    if structure_at_design.name != structure.name:
+    if structure_at_design.name != structure.name and not problem.model.is_complex:
         z = np.array([complex(r.re, r.im) for r in structure.roots for _ in range(r.multiplicity)])
         structure_at_design = replace(
             structure, distance=float(backward_error([float(c) for c in values.coefficients], z))
@@ -130,7 +131,7 @@ def diagnose_roots(
     """
     matrices = evaluate_matrices(model, parameter_set, design).astype(complex)
     range_widths, diagnoses = {n: b - a for n, (a, b) in (free or {}).items()}, []
-    if model.polynomial is None:
+    if not has_real_form(model):
         return ()
 
     def find_chains(point: RootPoint) -> Jordan | None:
@@ -144,7 +145,7 @@ def diagnose_roots(
         return jordan(matrices, point.s, point.multiplicity, threshold)
 
     with high_precision():
-        for root in user_roots(model, structure.roots):
+        for root in structure.roots:
             k = root.multiplicity
             if k == 1 or (root.im < 0 and not model.is_complex):
                 continue

@@ -24,11 +24,11 @@ import numpy as np
 from tmsopt.analysis.conditions import POSITIVE, STATIONARY, Conditions, curvature_sign, evaluate_conditions
 from tmsopt.analysis.descent import BetterDesign, find_better_design
 from tmsopt.analysis.program import LocalProgram, NotCovered, build_program
-from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
 from tmsopt.problem.dependence import demands_heavy_damping
 from tmsopt.problem.files import ProblemSource
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ROOT_NAMES
+from tmsopt.problem.real_form import RealForm, has_real_form, real_form
 from tmsopt.problem.solution import Solution
 from tmsopt.program.formulate import formulate
 from tmsopt.program.starts import initial_point
@@ -137,6 +137,10 @@ def optimality(design: ProblemSource, *, progress: Listener | None = None) -> Op
     """
     solution = solve_if_needed(design, progress)
     start_steps(progress, "checking the optimum")
+    if not has_real_form(solution.problem.model):
+        return Optimality(NOT_COVERED, "the matrices are too large for the polynomial that these conditions use")
+    form = real_form(solution.problem.posed)
+    solution = form.to_real(solution)
     try:
         problem = _choose_problem(solution)
         program = build_program(problem, solution)
@@ -147,7 +151,9 @@ def optimality(design: ProblemSource, *, progress: Listener | None = None) -> Op
     if not conditions.descent_direction.any() and not weight > POSITIVE:
         return Optimality(NOT_COVERED, "the objective does not decrease with the abscissa")
     better_design = find_better_design(program, conditions, solution) if conditions.descent_direction.any() else None
-    verdict, order, reason = _decide_verdict(solution, program, conditions, better_design)
+    verdict, order, reason = _decide_verdict(
+        solution, form.user_name(solution.structure), program, conditions, better_design
+    )
     is_stationary = conditions.residual <= STATIONARY
     unknown_count, condition_count = _count_unknowns(program)
     return Optimality(
@@ -155,7 +161,7 @@ def optimality(design: ProblemSource, *, progress: Listener | None = None) -> Op
         reason=reason,
         order=order,
         goal=problem.goal,
-        roots=_list_rightmost_roots(program, conditions) if is_stationary else (),
+        roots=_list_rightmost_roots(program, conditions, form) if is_stationary else (),
         limits=Table(_compute_limit_gains(solution, program, conditions) if is_stationary else {}),
         unknowns=unknown_count,
         conditions=condition_count,
@@ -186,8 +192,6 @@ def _choose_problem(solution: Solution) -> Posed:
         raise NotCovered(f"the objective is optimised over the designs with {problem.locate}, whatever their abscissa")
     if solution.structure == "undecided":
         raise NotCovered("double precision cannot tell which roots meet")
-    if problem.model.polynomial is None:
-        raise NotCovered("the matrices are too large for the polynomial that these conditions use")
     if problem.locate:
         problem = problem.derive(locate=None, minimize="abscissa")
     if demands_heavy_damping(problem):
@@ -207,10 +211,14 @@ def _choose_problem(solution: Solution) -> Posed:
 
 
 def _decide_verdict(
-    solution: Solution, program: LocalProgram, conditions: Conditions, better_design: BetterDesign | None
+    solution: Solution,
+    structure: str,
+    program: LocalProgram,
+    conditions: Conditions,
+    better_design: BetterDesign | None,
 ) -> tuple[str, int, str]:
     """The verdict, the order of the derivatives that decide it, and the verdict in a sentence."""
-    problem, name = program.problem, f"this {solution.structure} is"
+    problem, name = program.problem, f"this {structure} is"
     extreme = f"local {'maximum' if problem.sense == 'maximize' else 'minimum'} of {problem.goal}"
     extreme += ", though this was not asked for" if solution.problem.locate else ""
     if better_design is not None:
@@ -284,10 +292,9 @@ def _describe_better_design(solution: Solution, better_design: BetterDesign) -> 
     return f"{', '.join(parts)} gives {better_design.value:.6g}"
 
 
-def _list_rightmost_roots(program: LocalProgram, conditions: Conditions) -> tuple[RightmostRoot, ...]:
+def _list_rightmost_roots(program: LocalProgram, conditions: Conditions, form: RealForm) -> tuple[RightmostRoot, ...]:
     """The roots on the rightmost line with their multipliers."""
     rightmost_roots, rows = [], list(zip(program.rows, conditions.multipliers.tolist(), strict=True))
-    model = program.problem.model
     total_multiplier = sum(
         program.rightmost_roots[row.root_index].multiplicity * multiplier
         for row, multiplier in rows
@@ -299,8 +306,8 @@ def _list_rightmost_roots(program: LocalProgram, conditions: Conditions) -> tupl
         share = root.multiplicity * c1 / total_multiplier if total_multiplier else math.nan
         beta = c1 / 2 if root.im else c1  # β moves both roots of a pair by β/2
         # the user's root of a complex system is the conjugate
-        (user_root,) = user_roots(model, [root if not model.is_complex else replace(root, im=-root.im)])
-        omega = (complex(w.re, w.im) for w in eigenfrequencies(model, [user_root]))
+        (user_root,) = form.user_roots([root if form.carrier is None else replace(root, im=-root.im)])
+        omega = (complex(-user_root.im, user_root.re),) if form.carrier is not None else ()
         ties = tuple(multipliers.values())
         rightmost_roots.append(
             RightmostRoot(user_root.re, user_root.im, root.multiplicity, share, beta, c2, ties, *omega)

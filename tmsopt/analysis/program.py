@@ -127,9 +127,9 @@ def build_program(problem: Posed, solution: Solution) -> LocalProgram:
         raise NotCovered(f"the {active_quantities[0]} is active, which the conditions on the abscissa do not cover")
     if not (needed_names and ca.depends_on(ca.vertcat(f, *builder.expressions), x["abscissa"])):
         raise NotCovered("the abscissa is not active, so this optimum does not depend on the roots")
-    roots = solution.of_polynomial.roots
+    roots = solution.roots
     size = max(float(np.hypot(r.re, r.im)) for r in roots)
-    line_width = 0.0 if solution.of_polynomial.name in ("pair", "real") else _SAME_LINE * size
+    line_width = 0.0 if solution.structure in ("pair", "real") else _SAME_LINE * size
     line_roots = [r for r in roots if r.re >= solution.abscissa - line_width]
     rightmost_roots = tuple(r for r in line_roots if r.im >= 0)
     design = {n: ca.atan(x[n]) if problem.parameter_set[n].tangent else x[n] for n in free}

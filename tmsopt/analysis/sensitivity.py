@@ -92,7 +92,7 @@ def eigenvalues(design: ProblemSource, *, progress: Listener | None = None) -> E
     problem, roots = solution.problem.posed, solution.roots
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
     matrices = evaluate_matrices(problem.model, problem.parameter_set, parameters).astype(complex)
-    tolerance = _SAME_ROOT * max((r.size for r in solution.of_polynomial.roots), default=0.0)
+    tolerance = _SAME_ROOT * max((r.size for r in solution.roots), default=0.0)
     semisimple = [complex(m.re, m.im) for m in solution.meetings if m.longest == 1]
 
     def measure(root: Root) -> dict[str, float]:

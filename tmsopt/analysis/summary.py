@@ -11,6 +11,7 @@ from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import describe_user_structure
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ROOT_QUANTITIES, matrices_at
+from tmsopt.problem.real_form import has_real_form, real_form
 from tmsopt.problem.solution import Bound, Solution
 from tmsopt.problem.unit_system import Unit, round_one_way, unit_of
 
@@ -149,10 +150,10 @@ def _evaluate_signature(
 ) -> tuple[list[float], list[float]]:
     """Monic coefficients, and the values of expressions with fixed root quantities."""
     values = problem.values(problem.ordered(parameters))
-    if problem.model.polynomial is None:
+    if not has_real_form(problem.model):
         entries = matrices_at(problem.model, problem.parameter_set, parameters).ravel()
         return [*entries.real, *entries.imag], [float(e(values)) for e in expressions]
-    a = np.array([float(c) for c in values.coefficients])
+    a = np.array([float(c) for c in real_form(problem).problem.values(problem.ordered(parameters)).coefficients])
     values = values.with_known(dict.fromkeys(_ROOT_NAMES, 0.5))
     with np.errstate(all="ignore"):
         return list(a / a[0]), [float(e(values)) for e in expressions]

@@ -9,6 +9,7 @@ import numpy as np
 from tmsopt.models.exact import ExactDesign, as_exact_design
 from tmsopt.models.user_spectrum import distance_beyond_axis
 from tmsopt.problem.problem import Posed
+from tmsopt.problem.real_form import has_real_form, real_form
 from tmsopt.problem.verdict.stability import MultipleRoot, longest_chain_on_line
 from tmsopt.records import Array, Numbers
 from tmsopt.roots import Root, Structure, exact_longest, lienard_chipart, rebuilt, structure
@@ -26,7 +27,9 @@ def edges_at(problem: Posed, parameters: Numbers) -> tuple[str, ...]:
     The result is empty if a root is right of the imaginary axis. The test moves the roots to the axis, or the leading
     coefficient to 0. It compares this change of the coefficients with that caused by rounding of the parameters.
     """
-    values = problem.values(parameters)
+    if not has_real_form(problem.model):
+        return ()
+    values = real_form(problem).problem.values(parameters)
     c, errors = np.array([float(x) for x in values.coefficients]), np.array(values.roundings())
     is_nonzero = np.abs(c) > errors
     if not np.all(np.isfinite(c)) or not is_nonzero[:-1].any():
@@ -74,7 +77,9 @@ def find_longest_chain(problem: Posed, parameters: Numbers) -> int | None:
     The result is None if no root is on the axis, if a root is right of the axis, or if fractions do not decide. For
     p(s) = e(s²) + s o(s²), a root x of gcd(e, o) gives two roots s = ±√x of p, on the axis if x is real and ≤ 0.
     """
-    model, parameter_set = problem.model, problem.parameter_set
+    if not has_real_form(problem.model):
+        return None
+    model, parameter_set = real_form(problem).problem.model, problem.parameter_set
     design = convert_as_typed(problem, parameters)
     a = design.coefficients(model, parameter_set)
     if a is None or a[0] == 0:
@@ -101,10 +106,13 @@ def find_longest_chain(problem: Posed, parameters: Numbers) -> int | None:
 
 def is_exactly_multiple(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> bool:
     """Whether the polynomial in fractions, from the numbers as typed, has roots of these multiplicities."""
-    a = convert_as_typed(problem, parameters).coefficients(problem.model, problem.parameter_set)
+    if not has_real_form(problem.model):
+        return False
+    form = real_form(problem)
+    a = convert_as_typed(problem, parameters).coefficients(form.problem.model, problem.parameter_set)
     if a is None or a[0] == 0:
         return False
-    return sorted(r.multiplicity for r in roots) == sorted(m for _, m in isolated_roots(a))
+    return sorted(r.multiplicity for r in form.real_roots(roots)) == sorted(m for _, m in isolated_roots(a))
 
 
 def convert_as_typed(problem: Posed, parameters: Numbers) -> ExactDesign:

@@ -20,7 +20,6 @@ from tmsopt.boundaries.rays import (
 )
 from tmsopt.boundaries.weighted_design import WeightedDesign, weight_design
 from tmsopt.errors import InputError, input_error, suggest, table_faults
-from tmsopt.problem.evaluate import require_polynomial
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.problem.solution import Solution
@@ -238,7 +237,7 @@ def _survey_boundaries(base: WeightedDesign, kinds: Sequence[str] = KINDS, metho
     stable = base.is_stable and not base.edges
     design_tables = Table(base.parameters), Table(base.weights)
     zeros = _find_stabilising_zeros(base) if base.edges else ()
-    return Robustness(base.problem.problem, stable, base.edges, zeros, base.is_heavily_damped, *design_tables, *points)
+    return Robustness(base.stated.problem, stable, base.edges, zeros, base.is_heavily_damped, *design_tables, *points)
 
 
 def _find_stabilising_zeros(base: WeightedDesign) -> tuple[str, ...]:
@@ -256,7 +255,7 @@ def _find_stabilising_zeros(base: WeightedDesign) -> tuple[str, ...]:
 
 
 def _weight_given_design(design: ProblemSource, parameters: Numbers | None, weights: Numbers | None) -> WeightedDesign:
-    problem = require_polynomial(pose(design))
+    problem = pose(design)
     tables = {"parameters": (parameters, "{'Fr': 1.2, 'mu': 0.1}"), "weights": (weights, "{'lambda_s': 0.01}")}
     if faults := [f for n, (x, example) in tables.items() if x is not None for f in table_faults(n, x, example)]:
         raise InputError(faults)
@@ -275,7 +274,7 @@ def _find_nearest(
 ) -> Nearest:
     """Find the nearest point of one boundary, over all its edges; for heavy damping, some starts are no crossings."""
     is_damping = kind == "heavy damping"
-    if base.problem.model.is_complex and kind != "weave":  # an eigenfrequency can only cross the real line
+    if base.stated.model.is_complex and kind != "weave":  # an eigenfrequency can only cross the real line
         return Nearest(kind)
     if kind in base.edges or (is_damping and base.is_on_damping_edge):
         no_change = dict.fromkeys(base.weights, 0.0)

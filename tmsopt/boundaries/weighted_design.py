@@ -12,6 +12,7 @@ from tmsopt.boundaries.boundaries import measure_terms
 from tmsopt.errors import Fault, InputError, is_number, suggest
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import STRUCTURE_TOLERANCE
+from tmsopt.problem.real_form import real_form
 from tmsopt.records import Array, Numbers
 from tmsopt.roots import is_stable, multiple_real_roots, real_roots
 
@@ -26,10 +27,13 @@ class WeightedDesign:
     A displacement u gives the change of each parameter in units of its weight.
 
     Attributes:
+        stated: the problem of the user.
+        problem: its form with a real polynomial.
         parameters: every parameter of the problem's set.
         weights: parameter → change that counts as 1; parameters without weight stay fixed.
     """
 
+    stated: Posed
     problem: Posed
     parameters: Numbers
     weights: Numbers
@@ -138,7 +142,7 @@ def weight_design(problem: Posed, parameters: Numbers, weights: Numbers | None) 
     """A design with checked parameters and weights.
 
     Raises:
-        InputError: with all faults.
+        InputError: with all faults, or for matrices that are too large.
     """
     faults = [*parameter_faults(problem, parameters)]
     faults += [] if weights is None else _weight_faults(problem, weights)
@@ -146,7 +150,9 @@ def weight_design(problem: Posed, parameters: Numbers, weights: Numbers | None) 
         raise InputError(faults)
     values = {n: float(parameters[n]) for n in problem.parameter_set.names}
     weights = default_weights(problem, values) if weights is None else weights
-    return WeightedDesign(problem, values, {n: float(weights[n]) for n in values if weights.get(n, 0.0) > 0})
+    return WeightedDesign(
+        problem, real_form(problem).problem, values, {n: float(weights[n]) for n in values if weights.get(n, 0.0) > 0}
+    )
 
 
 def default_weights(problem: Posed, parameters: Numbers) -> dict[str, float]:

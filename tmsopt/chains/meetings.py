@@ -12,7 +12,6 @@ import numpy as np
 
 from tmsopt.chains.family import family_of
 from tmsopt.chains.points import gather_roots, measure_point, targets_of
-from tmsopt.models.user_spectrum import user_roots
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.stability import MultipleRoot
 from tmsopt.records import Numbers
@@ -31,14 +30,7 @@ _MIN_UNIT = 1e-3  # least unit for scaling the matrices at a root, as a share of
 
 
 def meetings(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
-    """The multiple roots among the roots of a design's polynomial, converted to roots of the user's system.
-
-    The rightmost root comes first.
-    """
-    return _find_all_eigenvectors(problem, parameters, user_roots(problem.model, roots))
-
-
-def _find_all_eigenvectors(problem: Posed, parameters: Numbers, roots: Sequence[Root]) -> tuple[MultipleRoot, ...]:
+    """The multiple roots among the roots of a design, the rightmost first."""
     multiple_roots: list[MultipleRoot] = []
     is_complex = problem.model.is_complex
     for root in roots:
@@ -67,7 +59,7 @@ def located_meetings(problem: Posed, pattern: Pattern, parameters: Numbers) -> t
     """The multiple roots of a pattern; none without matrices."""
     if problem.model.pencil is None:
         return ()
-    return _find_all_eigenvectors(problem, parameters, _located_roots(problem, pattern, parameters))
+    return meetings(problem, parameters, _located_roots(problem, pattern, parameters))
 
 
 def _located_roots(problem: Posed, pattern: Pattern, parameters: Numbers) -> list[Root]:

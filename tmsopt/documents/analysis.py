@@ -10,6 +10,7 @@ from tmsopt.analysis import Diagnosis, Explanation, diagnose, explain, infeasibl
 from tmsopt.boundaries import Robustness, find_stability_margins, robustness
 from tmsopt.dynamics import stable_speeds
 from tmsopt.errors import InputError
+from tmsopt.problem.real_form import has_real_form
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
 
@@ -85,4 +86,4 @@ class Analysis:
     def _can_be_analysed(self) -> bool:
         solution = self.solution
         is_solved = solution.status != "infeasible" and not solution.interrupted
-        return math.isfinite(solution.abscissa) and is_solved and solution.problem.model.polynomial is not None
+        return math.isfinite(solution.abscissa) and is_solved and has_real_form(solution.problem.model)

@@ -213,13 +213,11 @@ def describe_roots(solution: Solution, digits: int) -> tuple[str, str]:
             f"; √(g/w) = {1 / unit.factor:.{digits}g} {unit.text}" if unit != unit_of(problem, "abscissa") else ""
         )
         return "roots", (", ".join(format_roots(solution.roots, digits, 1 / unit.factor)) or "none") + unit_text
-    omegas, threshold = solution.eigenfrequencies, ZERO_SHARE * abs(solution.problem.model.carrier)
+    omegas = solution.eigenfrequencies
     middle = sum(z.re for z in omegas) / len(omegas) if omegas else 0.0
     spread = max((math.hypot(z.re - middle, z.im) for z in omegas), default=0.0) or 1.0
     digits = min(digits + max(0, math.ceil(math.log10(max(abs(middle), spread) / spread))), ALL_DIGITS)
-    return "eigenfrequencies", ", ".join(
-        format_frequency(z.re, z.im, digits, z.multiplicity, threshold) for z in omegas
-    )
+    return "eigenfrequencies", ", ".join(format_frequency(z.re, z.im, digits, z.multiplicity) for z in omegas)
 
 
 def format_root(root: Any, digits: int, multiplicity: int = 1, threshold: float = 0.0) -> str:
@@ -261,7 +259,7 @@ def format_multiplicity(multiplicity: int) -> str:
 def describe_abscissas(solution: Solution) -> Iterator[str]:
     """Describe the abscissa of the design, its abscissa after rounding to doubles, and its roots, to 12 digits."""
     problem, case_parameters = solution.problem.posed, parameters_of_worst_case(solution)
-    size = max((r.size for r in solution.of_polynomial.roots), default=1.0)
+    size = max((r.size for r in solution.roots), default=1.0)
     abscissas = (solution.abscissa, solution.abscissa_realised)
     exact_abscissa, stored_abscissa = (x if abs(x) > ZERO_SHARE * size else 0.0 for x in abscissas)
     stored_text = unit_at(problem, "abscissa", case_parameters).number(stored_abscissa, ALL_DIGITS)
@@ -282,9 +280,8 @@ def _find_time_units(solution: Solution) -> tuple[float, Unit, Unit]:
 
 def _name_real_eigenfrequencies(solution: Solution) -> str:
     """Name the real eigenfrequencies of a complex system."""
-    model = solution.problem.model
-    real_frequencies = eigenfrequencies(model, roots_on_axis(model, solution.roots))
-    texts = [format_frequency(z.re, 0.0, 5, z.multiplicity, ZERO_SHARE * abs(model.carrier)) for z in real_frequencies]
+    real_frequencies = eigenfrequencies(solution.problem.model, roots_on_axis(solution.roots))
+    texts = [format_frequency(z.re, 0.0, 5, z.multiplicity) for z in real_frequencies]
     return f"; {' and '.join(texts)} {'is' if len(texts) == 1 else 'are'} real" if texts else ""
 
 

@@ -144,9 +144,8 @@ def _write_notes(motion: "Simulation") -> Iterator[str]:
 
 
 def _largest_size(motion: "Simulation") -> float:
-    """Return the modulus of the largest root; for a complex H, the carrier is first subtracted from the frequencies."""
-    carrier = motion.problem.model.carrier
-    return max(math.hypot(m.re, m.im - carrier) for m in motion.modes)
+    """Return the modulus of the largest root."""
+    return max(math.hypot(m.re, m.im) for m in motion.modes)
 
 
 def _describe_motion_on_axis(motion: "Simulation") -> str:

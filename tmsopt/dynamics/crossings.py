@@ -15,8 +15,7 @@ from typing import Any
 import flint
 
 from tmsopt.algebra.balls import rational
-from tmsopt.models import Model
-from tmsopt.models.user_spectrum import user_roots, user_structure_name
+from tmsopt.problem.real_form import RealForm
 from tmsopt.roots.exact import exact_roots
 from tmsopt.roots.polynomial import Root
 from tmsopt.roots.stability import lienard_chipart
@@ -118,12 +117,12 @@ def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, b
     )
 
 
-def user_crossings(model: Model, crossings: Crossings) -> Crossings:
+def user_crossings(form: RealForm, crossings: Crossings) -> Crossings:
     """The crossings as the user sees them. For a complex system, they are crossings of its eigenfrequencies."""
-    if not model.is_complex:
+    if form.carrier is None:
         return crossings
     user_found = tuple(
-        replace(c, kind=user_structure_name(model, c.kind), root=user_roots(model, [replace(c.root, im=-c.root.im)])[0])
+        replace(c, kind=form.user_name(c.kind), root=form.user_roots([replace(c.root, im=-c.root.im)])[0])
         for c in crossings.found
         if c.kind not in ("capsize", "infinity")
     )

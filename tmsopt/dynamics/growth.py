@@ -16,10 +16,10 @@ from tmsopt.dynamics.system import is_bicycle
 from tmsopt.errors import InputError, input_error, is_number, short, suggest
 from tmsopt.files import write_csv
 from tmsopt.models import Model, Parameter, ParameterSet, Values
-from tmsopt.models.user_spectrum import user_root_array
 from tmsopt.problem.evaluate import find_eigenvalues
 from tmsopt.problem.files import ProblemSource
 from tmsopt.problem.problem import Problem
+from tmsopt.problem.real_form import real_form
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import AnyNumbers, Array, Complex, Tabular, Truth, plain
@@ -150,7 +150,7 @@ def growth(
     if not (end is None or (is_number(end) and end != 0)):
         raise input_error(f"found {short(end)}; accepted: a number other than 0", "end")
     parameter_set, parameters, name = _find_parameter(design, over)
-    model = design.problem.model
+    model, form = design.problem.model, real_form(design.problem.posed)
     has_critical = f"{name}_c" in model.quantity_names(parameter_set)
     design_value = parameters[name]
     critical = float(Values(model, parameter_set, parameters)[f"{name}_c"]) if has_critical else math.nan
@@ -159,19 +159,19 @@ def growth(
 
     def coefficients(x: Array) -> Array:
         """Coefficients at values x of the parameter, shape (n, degree + 1)."""
-        a = model.coefficients({**parameters, name: x}, parameter_set)
+        a = form.problem.model.coefficients({**parameters, name: x}, parameter_set)
         return np.stack(np.broadcast_arrays(*a, x)[:-1], axis=-1).astype(float)
 
     is_open, is_polynomial = is_speed and end is None, True
     try:
-        a = coefficients_over(design.problem.posed, parameter_set, parameters, name)
+        a = coefficients_over(form.problem, parameter_set, parameters, name)
         crossings = find_crossings(a, low, math.inf if is_open else high)
     except InputError:
         is_open = is_polynomial = False
         crossings = Crossings(
             tuple(_find_stability_changes(coefficients, np.linspace(low, high, _GRID_POINTS))), (), ()
         )
-    crossings = user_crossings(model, crossings)
+    crossings = user_crossings(form, crossings)
     if is_open:
         high = _choose_end(crossings.found, design_value)
     events = tuple(c for c in crossings.found if low < c.at < high)
@@ -212,10 +212,11 @@ def growth(
         is_bicycle=is_bicycle(model) and model.degree == _BICYCLE_DEGREE,
         over_speed=is_speed,
     )
-    if model.is_complex:
-        root_values = user_root_array(model, root_values)
+    if form.carrier is not None:
+        order = np.argsort(np.where(root_values.imag < 0, 0, 1), axis=-1, kind="stable")[..., : model.degree]
+        root_values = np.take_along_axis(root_values, order, axis=-1) + 1j * form.carrier
         modes = tuple(
-            replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * model.carrier) for m in modes
+            replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * form.carrier) for m in modes
         )
     return Growth(
         parameter_set[name],

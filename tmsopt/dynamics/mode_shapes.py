@@ -9,7 +9,7 @@ import numpy as np
 
 from tmsopt.analysis import diagnose_roots
 from tmsopt.dynamics.system import ANGLES, coordinates_of, matrices_of
-from tmsopt.models.user_spectrum import eigenfrequencies, user_roots
+from tmsopt.models.user_spectrum import eigenfrequencies
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Complex, Table, plain
 from tmsopt.roots import Root, Structure
@@ -72,7 +72,7 @@ def compute_mode_shapes(
     pencil = matrices_of(model)(parameter_set.native(parameters))
     names = coordinates_of(model, pencil)
     diagnoses = diagnose_roots(model, parameter_set, parameters, structure)
-    roots = [r for r in user_roots(model, structure.roots) if model.is_complex or r.im >= 0]
+    roots = [r for r in structure.roots if model.is_complex or r.im >= 0]
     shapes = []
     partial: tuple[int, ...]
     for root in sorted(roots, key=lambda r: (-r.re, -r.im)):

@@ -24,7 +24,6 @@ from tmsopt.dynamics.speeds import parameters_of
 from tmsopt.dynamics.system import ANGLES, RATES, System, matrices_of, system_of
 from tmsopt.errors import InputError, input_error
 from tmsopt.files import write_csv
-from tmsopt.models.user_spectrum import user_structure
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed, Problem
 from tmsopt.progress import Listener, start_steps
@@ -185,12 +184,11 @@ def simulate(
     start_steps(progress, "following the motion")
     system = system_of(problem, parameters)
     disturbance = parse_disturbance(system, arguments)
-    model_structure: Structure = problem.values(parameters)["structure"]
-    structure = user_structure(problem.model, model_structure)
+    structure: Structure = problem.values(parameters)["structure"]
     parameter_set = problem.parameter_set
     rate_unit = 1.0 if parameter_set.rate is None else float(parameter_set.rate(parameters))
     x = disturbance.state(system)
-    is_stable = _is_stable(problem, model_structure)
+    is_stable = _is_stable(problem, structure)
     has_died_out, end_time, motion = _choose_duration(system, x, structure, is_stable, rate_unit, seconds, bool(noise))
     times, step = np.linspace(0.0, end_time, points), end_time / (points - 1)
     output_rows, deviations = {n: system.rows[n] for n in (*system.coordinates, *system.torques)}, Table[float]()
@@ -207,7 +205,7 @@ def simulate(
     columns = {"t": Column(times)} | {n: Column(states @ system.rows[n]) for n in (*base_names, *extra_names)}
     if extra_names:
         columns["x"], extra_names = Column(system.speed * times), (*extra_names, "x")
-    modes = compute_mode_shapes(problem, parameters, model_structure, rate_unit)
+    modes = compute_mode_shapes(problem, parameters, structure, rate_unit)
     units = Table({n: system.units[n] for n in columns if n in system.units})
     return Simulation(
         problem.problem,
@@ -227,8 +225,7 @@ def simulate(
 def _is_stable(problem: Posed, structure: Structure) -> bool:
     """Whether the design is stable. Multiple roots, and roots of a complex H, must be stable by more than rounding."""
     rightmost_multiplicities = [r.multiplicity for r in structure.roots if r.re == structure.abscissa]
-    is_complex = problem.model.is_complex  # only a complex H has a carrier, a shift of its eigenfrequencies
-    is_exact = not is_complex and max(rightmost_multiplicities, default=1) == 1
+    is_exact = not problem.model.is_complex and max(rightmost_multiplicities, default=1) == 1
     max_root_size = max((r.size for r in structure.roots), default=0.0)
     return structure.abscissa < (0.0 if is_exact else -_ROUNDING * max_root_size)
 

@@ -15,9 +15,9 @@ from tmsopt.boundaries.weighted_design import parameter_faults
 from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, find_crossings, user_crossings
 from tmsopt.errors import InputError, input_error, short, suggest
 from tmsopt.models import ParameterSet
-from tmsopt.problem.evaluate import require_polynomial
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed, Problem
+from tmsopt.problem.real_form import real_form
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Table, Tabular, plain
@@ -130,7 +130,7 @@ def speeds(
 
     More: docs/explanation/weave_and_capsize.md
     """
-    posed = require_polynomial(pose(problem if problem is not None and isinstance(design, Mapping) else design))
+    posed = pose(problem if problem is not None and isinstance(design, Mapping) else design)
     nominal = posed.nominal
     parameter_set = nominal.parameter_set
     name = parameter if parameter is not None else speed_of(parameter_set)
@@ -152,9 +152,9 @@ def speeds(
     except (TypeError, ValueError):
         message = f"found {short(between)}; accepted: a smaller and a larger number, `--between LOW,HIGH`"
         raise input_error(message, "between") from None
-    crossings = user_crossings(
-        nominal.model, find_crossings(coefficients_over(nominal, parameter_set, parameters, name), lower, upper)
-    )
+    form = real_form(nominal)
+    coefficients = coefficients_over(form.problem, parameter_set, parameters, name)
+    crossings = user_crossings(form, find_crossings(coefficients, lower, upper))
     return Speeds(nominal.problem, name, Table(parameters), lower, upper, **vars(crossings))
 
 

@@ -7,7 +7,7 @@ one double is certainly the nearest.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
@@ -16,8 +16,7 @@ import flint
 from tmsopt.algebra.balls import exact
 from tmsopt.algebra.kinds import BALLS, ball_maximum, ball_minimum
 from tmsopt.evaluation.recheck import Evaluation
-from tmsopt.models import Model, Values
-from tmsopt.models.user_spectrum import user_roots
+from tmsopt.models import Values
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import depends_on_case
 from tmsopt.problem.problem import Posed
@@ -100,7 +99,7 @@ def certified_numbers(
         value=table("value")[""],
         abscissa=table("abscissa")[""],
         abscissa_realised=table("abscissa_realised")[""],
-        roots=numbers.get(("roots", "")) or user_roots(problem.model, checked.structure.roots),
+        roots=numbers.get(("roots", "")) or checked.structure.roots,
         quantities=table("quantities"),
         dimensionless=table("dimensionless"),
         si=table("si"),
@@ -153,7 +152,7 @@ class _Design:
         if worst_roots:
             known_values["abscissa"] = _find_rightmost(worst_roots)
             yield ("abscissa", ""), known_values["abscissa"], 0
-            yield ("roots", ""), _to_user_roots(model, worst_roots), 0
+            yield ("roots", ""), worst_roots, 0
         if checked.robustness and math.isfinite(checked.robustness.radius):
             known_values[RADIUS] = exact(checked.robustness.radius)
         nominal, abscissa, pi = self.values(Case()), known_values.get("abscissa", math.nan), flint.arb.pi()
@@ -223,12 +222,3 @@ def _find_rightmost(roots: _Roots) -> Any:
 def _compute_damping_ratio(root: EnclosedRoot) -> Any:
     """−Re s/|s|; 0 for a root at 0."""
     return flint.arb(0) if root.re == 0 and root.im == 0 else -root.re / root.modulus
-
-
-def _to_user_roots(model: Model, roots: _Roots) -> _Roots:
-    """The roots as users see them, with the carrier of a complex H; an imaginary part of at most 2⁻²¹² counts as 0."""
-    converted: _Roots = user_roots(model, roots)
-    if not model.is_complex:
-        return converted
-    tolerance = flint.arb(2) ** -_PRECISIONS[0] * (1 + abs(model.carrier))
-    return tuple(replace(z, im=flint.arb(0)) if z.im.contains(0) and abs(z.im) < tolerance else z for z in converted)

@@ -15,7 +15,6 @@ from tmsopt.boundaries.nearest import Robustness, find_stability_margins
 from tmsopt.chains.meetings import is_crossing, mismatch
 from tmsopt.models import Model, Values
 from tmsopt.models.expression import Expression
-from tmsopt.models.user_spectrum import public_names
 from tmsopt.problem.cases import Case
 from tmsopt.problem.dependence import WORSE_DIRECTION, depends_on_case
 from tmsopt.problem.problem import Posed
@@ -91,7 +90,7 @@ def recheck(
     parameter_set = problem.parameter_set
     names = [
         n
-        for n in (*public_names(problem.model, parameter_set), "damping_ratio")
+        for n in (*problem.model.quantity_names(parameter_set), "damping_ratio")
         if n not in problem.model.sets[0].names
     ]
     names += [RADIUS] if evaluation.robustness is not None else []

@@ -145,7 +145,7 @@ def abscissa_as_stored(solution: Solution) -> str:
     Empty if the two differ by at most a millionth.
     """
     ideal, realised = solution.abscissa, solution.abscissa_realised
-    size = max((r.size for r in solution.of_polynomial.roots), default=0.0)
+    size = max((r.size for r in solution.roots), default=0.0)
     ideal, realised = (x if abs(x) > _ZERO_SIZE * size else 0.0 for x in (ideal, realised))
     if not abs(realised - ideal) > _SHOWN_DIFFERENCE * abs(ideal) + FEASIBILITY_TOLERANCE * size:
         return ""

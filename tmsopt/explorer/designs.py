@@ -9,7 +9,6 @@ from tmsopt.analysis import proof_line
 from tmsopt.chains.meetings import meetings
 from tmsopt.errors import InputError
 from tmsopt.guide import example
-from tmsopt.models.user_spectrum import user_structure
 from tmsopt.problem import Posed, Solution, degrees_of_freedom
 from tmsopt.problem.files import problem_from_tables
 from tmsopt.problem.verdict.stability import MultipleRoot
@@ -133,4 +132,5 @@ def _find_exceptional_point(problem: Posed) -> Iterator[PageDesign]:
 
 
 def _compute_structure(problem: Posed, parameters: Mapping[str, float]) -> Structure:
-    return user_structure(problem.model, problem.nominal.values(parameters)["structure"])
+    structure: Structure = problem.nominal.values(parameters)["structure"]
+    return structure

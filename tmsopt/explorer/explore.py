@@ -16,7 +16,7 @@ from tmsopt.explorer.javascript import kernel_script, model_script
 from tmsopt.explorer.page_data import make_page_data
 from tmsopt.files import as_path, write_text
 from tmsopt.problem import Posed, Problem, ProblemSource, Solution, pose
-from tmsopt.problem.evaluate import require_polynomial
+from tmsopt.problem.real_form import real_form
 from tmsopt.problem.toml import read_page
 from tmsopt.program.options import CommonOptions
 from tmsopt.progress import start_steps
@@ -95,7 +95,8 @@ def explore(problem: ProblemSource, **options: Unpack[CommonOptions]) -> Explore
     """
     listener = options.get("progress")
     model = read_page(problem, "problem").data.get("model") if isinstance(problem, str | PathLike) else None
-    posed, solution = require_polynomial(pose(problem)), problem if isinstance(problem, Solution) else None
+    posed, solution = pose(problem), problem if isinstance(problem, Solution) else None
+    real_form(posed)  # raises an error if the matrices are too large
     if solution is None:
         if posed.pareto:
             posed = posed.derive(pareto=(), minimize=posed.pareto[0])
@@ -140,7 +141,11 @@ def _write_html(problem: Posed, designs: Sequence[PageDesign], model: Mapping[st
     """The page of a problem; the arguments are those of `make_page_data`."""
     script = model_script(problem)
     data = make_page_data(problem, designs, script, model, trace_curves) | {"version": version("tmsopt")}
-    page_scripts = script.text, kernel_script(problem.model.degree), f"const DATA = {_format_json(data)};"
+    page_scripts = (
+        script.text,
+        kernel_script(real_form(problem).problem.model.degree),
+        f"const DATA = {_format_json(data)};",
+    )
     parts = [*page_scripts, *(_read_minified(f"{name}.js") for name in _SCRIPT_NAMES.split())]
     contents = {  # mark in page.html → what replaces it
         "<!-- title -->": escape(problem.title or problem.model.title),

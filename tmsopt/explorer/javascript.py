@@ -20,6 +20,7 @@ from tmsopt.models.bicycles.bicycle import contact_path
 from tmsopt.problem.evaluate import coefficient_formula, nodes_of
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_QUANTITIES
+from tmsopt.problem.real_form import real_form
 from tmsopt.roots import lienard_chipart
 from tmsopt.roots.numeric import GOOD_ERROR
 from tmsopt.roots.quartics import factors, quartic, signs
@@ -47,7 +48,8 @@ def model_script(problem: Posed) -> Script:
     `problem.parameter_set`, in its order, in SI units and radians.
     """
     model, parameter_set = problem.model, problem.parameter_set
-    coefficients = coefficient_formula(model, parameter_set.name)
+    coefficients = coefficient_formula(real_form(problem).problem.model, parameter_set.name)
+    degree = len(coefficients.outputs) - 1
     quantities = tuple(q.name for q in (*model.quantities, *parameter_set.quantities))
     limits = {n: c for n, c in problem.conditions.items() if RADIUS not in c.names}
     derived = [*nodes_of(problem, {n: n for n in quantities}).values()]
@@ -59,7 +61,7 @@ def model_script(problem: Posed) -> Script:
     rate = trace(lambda p: [math.nan if parameter_set.rate is None else parameter_set.rate(p)], parameter_set.names)
     ride = trace(partial(_compute_ride, problem), parameter_set.names) if is_bicycle(problem) else None
     parts = [
-        f"degree: {model.degree}, size: {size}, order: {order}",
+        f"degree: {degree}, size: {size}, order: {order}",
         function("coefficients", ("x", "a"), coefficients, entries),
         function("derived", ("x", "r", "y"), formula(derived), all_inputs),
         function("pencil", ("x", "m"), pencil, entries) if pencil else "pencil: null",
@@ -141,7 +143,6 @@ _MAX_INLINE_LENGTH = 160
 def _make_pencil(problem: Posed) -> tuple[Formula | None, int, int]:
     """Entries of the matrices of a model, number of rows of a matrix, and order (number of matrices minus one)."""
     model, parameter_set = problem.model, problem.parameter_set
-    # With a carrier (added to the frequencies of a complex H), the motion is not the motion of the user's system.
     if model.pencil is None or model.is_complex:
         return None, 0, 0
     matrices = model.pencil(parameter_set.native({n: symbol(n) for n in parameter_set.names}))

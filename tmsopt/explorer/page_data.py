@@ -16,6 +16,7 @@ from tmsopt.guide import exact_value, toml_key, toml_text
 from tmsopt.models import Parameter, words_of
 from tmsopt.models.user_spectrum import AXIS_TOLERANCE, eigenfrequencies
 from tmsopt.problem import Posed, degrees_of_freedom, limit_value, unit_of
+from tmsopt.problem.real_form import real_form
 from tmsopt.problem.validate import MIN_SIZE
 from tmsopt.records import Array
 from tmsopt.tracing import domain, trace
@@ -58,7 +59,7 @@ def make_page_data(
         "impulseUnit": _IMPULSE_UNIT if parameter_set.torque is None else "N·m·s",
         "words": dict(words_of(problem.model)),
         "rootUnit": unit_of(problem, "abscissa").text,
-        "carrier": problem.model.carrier if problem.model.is_complex else None,
+        "carrier": real_form(problem).carrier,
         "onAxis": AXIS_TOLERANCE,
         "smallest": MIN_SIZE,
         "parameters": [_describe_parameter(problem, p, start[p.name]) for p in parameter_set.parameters],

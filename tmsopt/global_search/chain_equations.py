@@ -85,7 +85,7 @@ class ChainEquations:
         """Number of conditions on the parameters."""
         if self.symmetry == NONE:
             return sum(t.conditions(self.is_complex) for t in self.targets)
-        size = self.problem.model.size
+        size = self.problem.model.degree
         return sum(self.symmetry.independent_conditions(t.order, size) for t in self.targets)
 
     def start_values(self) -> Iterator[dict[str, Any]]:
@@ -247,7 +247,7 @@ def build_chain_equations(
         roots = tuple(
             s - _mean_eigenvalue(chain, model.is_complex) for s, chain in zip(roots, point.chains, strict=True)
         )
-        is_centred = symmetry.is_chiral and targets[0].order == model.size
+        is_centred = symmetry.is_chiral and targets[0].order == model.degree
         targets = tuple(replace(t, axis="zero" if is_centred else "imaginary") for t in targets)
         if symmetry.is_real:
             ends = (1j**chain.order * chain.values[-1] for chain in point.chains)

@@ -30,6 +30,7 @@ from tmsopt.global_search.pattern_equations import (
 from tmsopt.global_search.pruning import Box, BoxConditions, outer_doubles, prepare_formula, prune
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import lifted_quantities
+from tmsopt.problem.real_form import real_form
 from tmsopt.program.nlp import Scale, proof_units, scale_of
 from tmsopt.progress import ReportCount
 from tmsopt.records import Array, Table, plain
@@ -229,11 +230,13 @@ def _add_zero(zeros: list[_Zero], system: PatternSystem, wide_box: Box, image_bo
 
 def _enumerate_systems(problem: Posed) -> Iterator[PatternSystem]:
     """Yield one system for each choice of small and large roots."""
+    frame = find_rotating_frame(problem)
+    problem = problem if frame else real_form(problem).problem
     assert problem.pattern is not None
     equalities = tuple(c for c in problem.conditions.values() if c.equality)
     middle = {n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}
     lifted = lifted_quantities(problem.model, problem.parameter_set, problem.ordered(middle), equalities)
-    frame, scale = find_rotating_frame(problem), scale_of(problem)
+    scale = scale_of(problem)
     for pieces in enumerate_pieces(problem.pattern.form, is_complex=frame is not None):
         yield build_system(problem, pieces, frame or Scale(_UNIT_FACTOR * scale.unit, scale.a0_unit), lifted)
 

@@ -18,7 +18,7 @@ from tmsopt.algebra.intervals import ranges, round_outwards
 from tmsopt.algebra.kinds import atan, quotient_or_nan
 from tmsopt.models import Quantity, Values
 from tmsopt.models.expression import Expression
-from tmsopt.models.stated.pairs import Pair
+from tmsopt.models.stated.pairs import Pair, pair
 from tmsopt.problem.problem import Posed
 from tmsopt.program.nlp import Scale
 from tmsopt.roots import product as polynomial_product
@@ -272,7 +272,7 @@ def build_system(
         ascending=formula(
             (q.order_key(pattern_unknowns) - p.order_key(pattern_unknowns) for p, q in interchangeable), names
         ),
-        leading=formula([values.coefficients[0]], names),
+        leading=formula([pair(a[0]).re], names),
         limits={n: formula([c(values)], names) for n, c in limits.items()},
     )
 

@@ -73,7 +73,7 @@ def _describe(model: Model, problem: Posed | None = None, tables: TypedTables = 
     return Description(
         model=model.name,
         meaning=model.title,
-        degree=model.size,
+        degree=model.degree,
         title=problem.title if problem else "",
         sets=tuple(
             _list_words(model, parameter_set, problem, model_table)

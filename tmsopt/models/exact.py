@@ -178,8 +178,6 @@ class ExactDesign:
         numbers = self.fractions(parameter_set)
         if numbers is None or model.pencil is None:
             return None
-        if model.is_complex:
-            return _real_form(model, {n: node_of(Fraction(str(x))) for n, x in numbers.items()})
         try:
             return [[[rational(x) for x in row] for row in P] for P in model.pencil(parameter_set.native(numbers))]
         except (TypeError, ValueError, AttributeError):  # the matrices use other functions of an angle than its tangent
@@ -190,20 +188,6 @@ class ExactDesign:
         if name in self.tangents:
             return f"tan({name})", str(self.tangents[name])
         return name, str(self.values[name])
-
-
-def _real_form(model: Model, numbers: AnyNumbers) -> list[list[list[Any]]] | None:
-    """I and −A of (Re ψ, Im ψ)′ = A (Re ψ, Im ψ), with the carrier, in fractions; None if an entry is irrational."""
-    assert model.pencil is not None
-    rows = model.pencil(numbers)[1]  # s + i H
-    parts = [[(x.re.fraction, x.im.fraction) for x in row] for row in rows]
-    if any(part is None for row in parts for entry in row for part in entry):
-        return None
-    n, shift = len(rows), Fraction(model.carrier)
-    re = [[rational(x) for x, _ in row] for row in parts]
-    im = [[rational(y + shift * (i == j)) for j, (_, y) in enumerate(row)] for i, row in enumerate(parts)]
-    A = [[*x, *(-b for b in y)] for x, y in zip(re, im, strict=True)] + [[*y, *x] for x, y in zip(re, im, strict=True)]
-    return [[[flint.fmpq(int(i == j)) for j in range(2 * n)] for i in range(2 * n)], A]
 
 
 def as_exact_design(

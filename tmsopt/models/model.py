@@ -236,7 +236,7 @@ class Model:
         sets: parameter sets; the first is the native one.
         algebraic: native parameters → algebraic parameters, in which the coefficients are polynomials.
         polynomial: algebraic parameters → coefficients, descending, computed with ``+ - *`` only; None for large
-            matrices, whose roots are computed without it.
+            and for complex matrices, whose roots are computed without it.
         quantities: derived quantities, besides the coefficients ``a0 …``.
         compact: like `polynomial`, but the coefficients are divided by a positive number and computed in few
             operations with common terms, which gives tighter bounds in interval arithmetic.
@@ -253,10 +253,7 @@ class Model:
         conventions: texts about the signs.
         sketch: drawing as text.
         absent: unknown names that a user may try → what to write instead.
-        is_complex: whether the system is stated by a complex H.
-        carrier: number added to each eigenfrequency of a complex H; 0 for a real system. The real polynomial of H
-            has twice the degree. Because of the carrier, none of its roots coincides with the conjugate of another.
-        carried: for a complex H, ranges of the native parameters → the model with a carrier for these ranges.
+        is_complex: whether the system is stated by complex numbers.
 
     Example:
         >>> swing = tmsopt.models.from_coefficients([1, "c", "k"])
@@ -286,8 +283,6 @@ class Model:
     sketch: str = ""
     absent: Mapping[str, str] = Table()
     is_complex: bool = False
-    carrier: float = 0.0
-    carried: Callable[[Mapping[str, tuple[float, float]]], "Model"] | None = None
 
     def __repr__(self) -> str:
         return f"Model(name={self.name!r}, title={self.title!r}, degree={self.degree}, natural={self.natural})"
@@ -299,7 +294,7 @@ class Model:
         return origin if is_unchanged else super().__reduce_ex__(protocol)
 
     def evaluate_polynomial(self, algebraic: AnyNumbers) -> list[Any]:
-        """The coefficients for algebraic parameters; none for large matrices."""
+        """The coefficients for algebraic parameters; none without a polynomial."""
         return self.polynomial(**algebraic) if self.polynomial else []
 
     def coefficients(self, parameters: AnyNumbers, of: ParameterSet | None = None) -> list[Any]:
@@ -326,20 +321,6 @@ class Model:
             outputs = [*(native[n] for n in self.sets[0].names), *coefficients]
             formulas[parameter_set.name] = formula(outputs, parameter_set.names)
         return formulas
-
-    @property
-    def is_doubled(self) -> bool:
-        """Whether the polynomial is that of a real system of twice the size, for a complex H."""
-        return self.is_complex and self.polynomial is not None
-
-    @property
-    def size(self) -> int:
-        """Number of roots of the system as the user states it."""
-        return self.degree // 2 if self.is_doubled else self.degree
-
-    def within(self, ranges: Mapping[str, tuple[float, float]]) -> "Model":
-        """The model for parameters in given ranges: a complex H gets a carrier for them, other models stay the same."""
-        return self if self.carried is None else self.carried(ranges)
 
     def _repr_latex_(self) -> str | None:
         """The characteristic polynomial in the native parameters; None if it is too long."""

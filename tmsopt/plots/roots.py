@@ -53,8 +53,7 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
     roots = [(float(r.re), float(r.im), r.multiplicity) for r in data.roots]
     if is_complex:
         positions = {(0.0 - im, re): m for re, im, m in roots}
-        problem = getattr(data, "problem", None)
-        _frame_frequencies(ax, positions, abs(problem.model.carrier or 1.0) if problem else 1.0)
+        _frame_frequencies(ax, positions)
     else:
         positions = {(rate * re, rate * im * sign): m for re, im, m in roots for sign in (1, -1)}
         size = max((math.hypot(*z) for z in positions), default=1.0) * 1.3 or 1.0
@@ -69,16 +68,12 @@ def draw_roots(data: Solution | Proof | Optimality, ax: Axes | None = None) -> A
     return finish_axes(ax)
 
 
-def _frame_frequencies(ax: Axes, positions: Iterable[tuple[float, float]], scale: float) -> None:
-    """Set limits around eigenfrequencies, and colour the half-plane above the real axis, where motion grows.
-
-    Args:
-        scale: size of frequencies in the problem; smaller sizes than 1e-12 of this are rounding errors.
-    """
+def _frame_frequencies(ax: Axes, positions: Iterable[tuple[float, float]]) -> None:
+    """Set limits around eigenfrequencies, and colour the half-plane above the real axis, where motion grows."""
     x, y = np.array([*positions]).T
     middle, low, high = np.mean(x), min(0.0, *y), max(0.0, *y)
     size = max(np.ptp(x), high - low)
-    size = size if size > 1e-12 * scale else max(abs(middle), scale)
+    size = size if size > 1e-12 * abs(middle) else abs(middle) or 1.0
     ax.axhspan(0, high + size, color="0.92", zorder=0)
     ax.set(xlim=(middle - 0.8 * size, middle + 0.8 * size), ylim=(low - 0.3 * size, high + 0.3 * size))
     ax.set(xlabel=COMPLEX_H_LABELS["imag"], ylabel=COMPLEX_H_LABELS["real"])

@@ -8,7 +8,7 @@ from typing import Any
 
 from tmsopt.errors import InputError
 from tmsopt.models import controlled
-from tmsopt.problem.cases import middle_of, parse_scenario, points_of
+from tmsopt.problem.cases import middle_of, parse_scenario
 from tmsopt.problem.units import TABLES, read_numbers
 from tmsopt.problem.validate import find_faults, shape_faults
 
@@ -53,18 +53,11 @@ def normalise(**arguments: Any) -> dict[str, Any]:
 def complete_fields(**fields: Any) -> dict[str, Any]:
     """The complete fields of a problem, from fields with valid numbers and texts.
 
-    A range of one value becomes a fixed parameter. Start values of parameters that are not free are dropped. The model
-    of a complex H gets a carrier, a constant that is added to all eigenfrequencies, for the ranges.
+    A range of one value becomes a fixed parameter. Start values of parameters that are not free are dropped.
     """
     free = fields["free"]
     single_values = {n: lo for n, (lo, hi) in free.items() if hi - lo <= _MIN_WIDTH * max(abs(lo), abs(hi))}
     fixed = {n: float(v) for n, v in {**fields["fixed"], **single_values}.items()}
     free = {n: (float(lo), float(hi)) for n, (lo, hi) in free.items() if n not in single_values}
     start = {n: float(v) for n, v in fields["start"].items() if n in free}
-    ranges = {n: (x, x) for n, x in fixed.items()} | free  # least and greatest value over all cases
-    for name, scenario in fields["scenarios"].items():
-        points = [*points_of(scenario), fixed[name]]
-        ranges[name] = min(points), max(points)
-    tolerances = {n: fields["tolerances"].get(n, 0.0) for n in ranges}
-    model = fields["model"].within({n: (lo - tolerances[n], hi + tolerances[n]) for n, (lo, hi) in ranges.items()})
-    return fields | {"model": model, "fixed": fixed, "free": free, "start": start}
+    return fields | {"fixed": fixed, "free": free, "start": start}

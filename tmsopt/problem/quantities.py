@@ -30,6 +30,9 @@ _ROUNDING = 4 * np.finfo(float).eps  # relative rounding error of a term of a po
 
 _DIGITS = 120  # decimal digits in which products of five doubles are exact
 
+_MAX_EXACT_EIGENVALUES = 30  # more eigenvalues with 120 digits would take seconds
+_ZERO_EIGENVALUE = 1e-25  # relative to the entries; at 120 digits, parts of eigenvalues this small are 0
+
 _CACHE_SIZE = 64  # number of structures in the cache; several quantities of a design use the same structure
 
 _LARGEST_ROOT = 1e50
@@ -95,15 +98,16 @@ def _cached_structure(a: tuple[float, ...], roundings: tuple[float, ...]) -> Str
 def roots_at(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) -> tuple[Root, ...]:
     """Exact roots for parameters in double precision, rightmost first; none if a coefficient is undefined.
 
-    The parameters count as exact, coefficients have 120 digits, and roots are isolated in interval arithmetic. For
-    large matrices the roots are the computed eigenvalues.
+    The parameters count as exact, coefficients have 120 digits, and roots are isolated in interval arithmetic. Without
+    a polynomial the roots are eigenvalues computed with 120 digits, or in doubles if they are many.
     """
     if model.polynomial is None:
+        is_small = model.degree <= _MAX_EXACT_EIGENVALUES
+        find_eigenvalues = _find_eigenvalues_exactly if is_small else _find_eigenvalues
         try:
-            eigenvalues = eigenvalues_of(matrices_at(model, parameter_set, parameters))
-        except np.linalg.LinAlgError:
+            return rightmost_first(find_eigenvalues(model, parameter_set, parameters))
+        except (np.linalg.LinAlgError, ZeroDivisionError, ValueError):
             return ()
-        return rightmost_first(Root(float(z.real), float(z.imag)) for z in eigenvalues)
     with flint.ctx.workdps(_DIGITS):
         exact_parameters = {name: flint.arb(value) for name, value in parameters.items()}
         coefficients = model.coefficients(exact_parameters, parameter_set)
@@ -113,6 +117,26 @@ def roots_at(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) 
     if leading_index is None or leading_index == len(coefficients) - 1:
         return ()
     return exact_roots(coefficients[leading_index:])
+
+
+def _find_eigenvalues(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) -> list[Root]:
+    eigenvalues = eigenvalues_of(matrices_at(model, parameter_set, parameters))
+    return [Root(float(z.real), float(z.imag)) for z in eigenvalues]
+
+
+def _find_eigenvalues_exactly(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) -> list[Root]:
+    assert model.pencil is not None
+    with flint.ctx.workdps(_DIGITS):
+        matrices = model.pencil(parameter_set.native({n: flint.arb(x) for n, x in parameters.items()}))
+        leading, *others = (flint.acb_mat([[flint.acb(x) for x in row] for row in P]) for P in matrices)
+        n, size = len(matrices[0]), len(others) * len(matrices[0])
+        last_rows = [leading.solve(P).tolist() for P in others[::-1]]
+        rows = [[flint.acb(j == i + n) for j in range(size)] for i in range(size - n)]
+        rows += [[-x for P in last_rows for x in P[i]] for i in range(n)]
+        eigenvalues = flint.acb_mat(rows).eig(algorithm="approx")
+        zero = _ZERO_EIGENVALUE * max(float(abs(z)) for row in rows for z in row)
+        parts = ((float(z.real), float(z.imag)) for z in eigenvalues)
+        return [Root(*(x if abs(x) > zero else 0.0 for x in pair)) for pair in parts]
 
 
 def _damping_ratio(values: AnyNumbers) -> float:

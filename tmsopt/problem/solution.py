@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from tmsopt.models import inertia_margin
-from tmsopt.models.user_spectrum import distance_beyond_axis, eigenfrequencies, polynomial_structure
+from tmsopt.models.user_spectrum import distance_beyond_axis, eigenfrequencies
 from tmsopt.problem.advice.remedies import Relaxation, RequiredValue
 from tmsopt.problem.cases import Case, Cover
 from tmsopt.problem.freedom import Freedom
@@ -17,7 +17,7 @@ from tmsopt.problem.unit_system import units_of
 from tmsopt.problem.units import Reading
 from tmsopt.problem.verdict.stability import STABLE, MultipleRoot, StabilityVerdict, roots_to_json, stability
 from tmsopt.records import Printable, Table, call_documents, plain
-from tmsopt.roots import Root, Structure
+from tmsopt.roots import Root
 
 _GAIN_DIGITS = 6  # digits of gains and violations in JSON
 _SIDE_DIGITS = 9  # digits of the best objective of each part of the box in JSON
@@ -164,7 +164,7 @@ class Solution(Printable):
     @property
     def stability(self) -> StabilityVerdict:
         """The verdict in the worst case, with the power of t by which the motion grows."""
-        largest = max((r.size for r in self.of_polynomial.roots), default=0.0)
+        largest = max((r.size for r in self.roots), default=0.0)
         return stability((self.abscissa, self.abscissa_realised), self.edges, self.meetings, largest)
 
     @property
@@ -221,11 +221,6 @@ class Solution(Printable):
         """`models.inertia_margin` of a stable point-mass design in SI at its nominal values; else None."""
         in_si = self.problem.model.name == "tms" and self.problem.posed.parameter_set.rate is not None
         return inertia_margin(self.parameters) if in_si and self.stable else None
-
-    @property
-    def of_polynomial(self) -> Structure:
-        """Structure and roots of the model's polynomial; for a complex system, of its real system of twice the size."""
-        return polynomial_structure(self.problem.model, self.structure, self.roots)
 
     def response(self, **arguments: Any) -> Any:
         """The motion of this design after a lean or a push, as a `tmsopt.Simulation`.

@@ -73,7 +73,7 @@ def count_by_symmetry(problem: Posed) -> int:
     parts, double = composition(pattern.name), "EP" if model.is_complex else "CEP"
     if any(kind != double for kind, _, _ in parts):
         return 0
-    symmetry, size = find_symmetry(problem), model.size
+    symmetry, size = find_symmetry(problem), model.degree
     return sum(count * (2 * (k - 1) - symmetry.independent_conditions(k, size)) for _, k, count in parts)
 
 
@@ -124,7 +124,7 @@ def reduce_problem(problem: Posed) -> Posed | None:
     None if it is not real, or if limits use anything else than free parameters.
     """
     model, names = problem.model, tuple(problem.free)
-    if not model.is_doubled or problem.pattern is None or not names or problem.objective is not None or problem.cases:
+    if not model.is_complex or problem.pattern is None or not names or problem.objective is not None or problem.cases:
         return None
     has_other_parts = any(kind != "EP" for kind, _, _ in composition(problem.pattern.name))
     uses_other_names = any(not set(c.names) <= set(names) for c in problem.conditions.values())

@@ -9,7 +9,7 @@ from tmsopt.errors import Fault, limit_advice, short, suggest, table_faults, tex
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.expression import ExpressionError, UnknownName, parse_comparison, parse_value
 from tmsopt.models.names import AMBIGUOUS_NAMES
-from tmsopt.models.user_spectrum import pattern_of, patterns_of, public_names
+from tmsopt.models.user_spectrum import pattern_of, patterns_of
 from tmsopt.problem.advice.names import example_of, suggest_name
 from tmsopt.problem.cases import Band, points_of
 from tmsopt.problem.quantities import expand_names, root_names
@@ -272,7 +272,7 @@ def _pattern_faults(name: Any, model: Model, key: tuple[str, ...]) -> Iterator[F
 
 
 def _expression_faults(problem: StatedProblem, parameter_set: ParameterSet) -> Iterator[Fault]:
-    accepted = (*parameter_set.names, *public_names(problem.model, parameter_set), *root_names(problem.model))
+    accepted = (*parameter_set.names, *problem.model.quantity_names(parameter_set), *root_names(problem.model))
     advice = limit_advice(suggest_name)
 
     def parse_faults(parse: Any, text: Any, *key: str) -> Iterator[Fault]:

@@ -16,6 +16,7 @@ from tmsopt.global_search.tasks import INFEASIBLE, SolverFailed
 from tmsopt.problem.cases import Case
 from tmsopt.problem.files import ProblemSource, as_solvable
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS, ROOT_NAMES
+from tmsopt.problem.real_form import real_form
 from tmsopt.problem.solution import Bound, Solution
 from tmsopt.program.formulate import Builder
 from tmsopt.progress import Listener, begin, steps_for
@@ -69,6 +70,13 @@ def certify(design: ProblemSource, *, seconds: float = SECONDS, progress: Listen
         return _add_note(solution, "nothing is minimised or maximised, so there is nothing to bound")
     if problem.asks_radius:
         return _add_note(solution, f"no bound: branch and bound does not support {RADIUS}")
+    form = real_form(problem)
+    return form.to_user(_bound(form.to_real(solution), seconds, progress), problem)
+
+
+def _bound(solution: Solution, seconds: float, progress: Listener | None) -> Solution:
+    """The solution of a problem with a polynomial, with the bound that can be proved in the time."""
+    problem = solution.problem.posed
     with SolverPool(SOLVER) as pool:
         steps = steps_for(progress)
         clock = Clock(seconds, pool, steps)
@@ -200,7 +208,7 @@ def _pose_question(design: Solution, level: float | None) -> Question:
     """Ask whether any design is better by a gap of this level; None asks whether any design is feasible."""
     problem = design.problem.posed
     limit = None if level is None else design.value - problem.sign * _gap(design.value, level)
-    return Question(problem, _cases(design), limit, typical_size(design.of_polynomial.roots))
+    return Question(problem, _cases(design), limit, typical_size(design.roots))
 
 
 def _proved_bound(design: Solution, level: float, clock: Clock) -> Bound:

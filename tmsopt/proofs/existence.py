@@ -13,7 +13,9 @@ from tmsopt.algebra.balls import GUARD_DIGITS, largest_radius, upper_bound
 from tmsopt.algebra.krawczyk import Enclosure, ProofFailed, enclose_solution, refine_solution
 from tmsopt.global_search.chain_equations import ChainEquations, build_chain_equations, has_chain_proof
 from tmsopt.models.exact import ExactDesign
+from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.problem import Posed
+from tmsopt.problem.real_form import has_real_form, real_form
 from tmsopt.program.nlp import Scale
 from tmsopt.proofs.factorisation import Factorisation, factor_pattern, factor_polynomial, has_pattern
 from tmsopt.proofs.system import ROUNDINGS, Equations, MovedParameters, build_equations, choose_moved
@@ -73,10 +75,12 @@ def prove_exactly(problem: Posed, pattern: Pattern, design: ExactDesign) -> Prov
 
 def enclose_stored(problem: Posed, design: ExactDesign) -> ProvedDesign | None:
     """Enclose the roots of the stored design in balls, for any pattern; None if a0 may be 0."""
-    balls, parameter_set = design.balls(), problem.parameter_set
+    if not has_real_form(problem.model):
+        return None
+    balls, parameter_set, model = design.balls(), problem.parameter_set, real_form(problem).problem.model
     tangents = {n: x for n, x in _exact_numbers(problem, design).items() if parameter_set[n].tangent}
-    exact_coefficients = design.coefficients(problem.model, parameter_set)
-    a = problem.model.coefficients(balls, parameter_set) if exact_coefficients is None else exact_coefficients
+    exact_coefficients = design.coefficients(model, parameter_set)
+    a = model.coefficients(balls, parameter_set) if exact_coefficients is None else exact_coefficients
     if not a or a[0] == 0 or flint.arb(a[0]).contains(0) or not all(flint.arb(c).is_finite() for c in a):
         return None
     if exact_coefficients is not None:
@@ -101,7 +105,9 @@ def prove_nearby(
         changed = set(design.given_exactly) & set(problem.fixed) - set(problem.typed(stored_values))
         system = build_chain_equations(problem, pattern, stored_values, uses_symmetry=not changed)
     else:
-        system = build_equations(problem, pattern, stored_values)
+        form = real_form(problem)
+        real_pattern = pattern_of(form.problem.model, form.real_name(pattern.name)) if form.carrier else pattern
+        system = build_equations(form.problem, real_pattern, stored_values)
     for _ in range(_MAX_ATTEMPTS):
         with flint.ctx.workdps(working_digits):
             proved_design = _search_nearby(system, design, stored_values, working_digits - _EXTRA_DIGITS // 2)
@@ -181,10 +187,11 @@ def _prove_from(system: AnyEquations, start: Mapping[str, Any], candidates: list
     distance, explained = _measure_distance(choice, start, enclosure, system.units)
     tangents = {n: solution[n] for n in parameter_set.names if parameter_set[n].tangent}
     parameters = {n: solution[n].atan() if n in tangents else solution[n] for n in parameter_set.names}
-    coefficients = system.problem.model.coefficients(parameters, parameter_set)
+    form = real_form(system.problem) if has_real_form(system.problem.model) else None
+    coefficients = form.problem.model.coefficients(parameters, parameter_set) if form else []
     if isinstance(system, ChainEquations):
         system.check(solution)
-        factorisation = _factorise(system, coefficients, solution)
+        factorisation = _factorise(system, coefficients, solution, form.carrier or 0.0 if form else 0.0)
     else:
         _check_solution(system, coefficients, solution)
         factorisation = factor_pattern(system.pattern, [solution[n] for n in system.pattern_unknowns])
@@ -213,12 +220,14 @@ def _list_chain_roots(system: ChainEquations, solution: Mapping[str, Any]) -> tu
     return tuple(roots)
 
 
-def _factorise(system: ChainEquations, coefficients: Sequence[Any], solution: Mapping[str, Any]) -> Factorisation:
+def _factorise(
+    system: ChainEquations, coefficients: Sequence[Any], solution: Mapping[str, Any], carrier: float
+) -> Factorisation:
     """The polynomial of a model as a product of the multiple factors and the other roots' factor."""
     rest = [c / coefficients[0] for c in coefficients]  # empty for large matrices
     factors = list[tuple[list[Any], int]]()
     for s, target in zip(system.eigenvalues(solution), system.targets, strict=True):
-        height = s.imag - system.problem.model.carrier
+        height = s.imag - carrier
         square = s.real * s.real + height * height  # a power of a ball around 0 would be nan
         is_real = target.is_real(system.problem.model.is_complex)
         factor = [flint.arb(1), -s.real] if is_real else [flint.arb(1), -2 * s.real, square]

@@ -9,9 +9,9 @@ from tmsopt.algebra.balls import rational
 from tmsopt.algebra.kinds import BALLS
 from tmsopt.models import Values
 from tmsopt.models.exact import ExactDesign
-from tmsopt.models.user_spectrum import user_roots
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
+from tmsopt.problem.real_form import real_form
 from tmsopt.proofs.existence import EXACT, ProvedDesign
 from tmsopt.proofs.factorisation import Factorisation
 from tmsopt.roots import exact_nullity, has_one_eigenvector
@@ -61,7 +61,8 @@ def eigenvector_verdict(problem: Posed, design: ExactDesign, proved_design: Prov
         return None, NOT_CHECKED
     if proved_design.chain_roots:
         return 1, Verdict(True, "one eigenvector, because the bordered matrix is regular (interval arithmetic)")
-    matrices = design.matrices(problem.model, parameter_set) if proved_design.method == EXACT else None
+    form = real_form(problem)
+    matrices = design.matrices(form.problem.model, parameter_set) if proved_design.method == EXACT else None
     if matrices:
         parts = flint.fmpq_poly(list(proved_design.coefficients)[::-1]).factor()[1]
         nullities = [(exact_nullity(matrices, part), int(count)) for part, count in parts if count > 1]
@@ -71,7 +72,7 @@ def eigenvector_verdict(problem: Posed, design: ExactDesign, proved_design: Prov
             is_defective, f"{largest_nullity} eigenvector{'s' * (largest_nullity > 1)}, in fractions"
         )
     matrices_at = pencil(parameter_set.native(proved_design.parameters))
-    all_roots = user_roots(problem.model, (z for f in repeated_factors for z in factor_roots(f) or ()))
+    all_roots = form.user_roots(z for f in repeated_factors for z in factor_roots(f) or ())
     roots = [flint.acb(z.re, z.im) for z in all_roots]
     has_one = bool(roots) and all(has_one_eigenvector(matrices_at, s) for s in roots)
     words = (

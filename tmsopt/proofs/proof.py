@@ -13,10 +13,11 @@ from tmsopt.algebra.krawczyk import ProofFailed
 from tmsopt.errors import Fault, InputError, count_faults
 from tmsopt.models.exact import ExactDesign, as_exact_design
 from tmsopt.models.names import number_text
-from tmsopt.models.user_spectrum import pattern_of, user_roots, user_structure_name
+from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem.cases import Case
 from tmsopt.problem.files import ProblemSource
 from tmsopt.problem.problem import Posed, Problem
+from tmsopt.problem.real_form import has_real_form, real_form
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import units_of
 from tmsopt.problem.verdict.stability import CROSSING, describe_crossing
@@ -193,8 +194,8 @@ def prove(
         claim = f"a design of '{problem.title or 'the problem'}' exists"
         return Proof(claim, False, reason, digits=digits, problem=problem.problem)
     begin(solve_options.progress, f"proving to {digits} digits")
-    spectrum = solution.of_polynomial
-    return prove_design(problem, solution.parameters, spectrum.name, digits, exact, solution.worst, spectrum.roots)
+    structure, roots = solution.structure, solution.roots
+    return prove_design(problem, solution.parameters, structure, digits, exact, solution.worst, roots)
 
 
 def prove_design(
@@ -255,7 +256,7 @@ def _prove_first(
             reasons.append(str(failure))
         else:
             return _assemble(problem, design, pattern.name, pattern, proved_design, digits)
-    name = problem.locate or user_structure_name(problem.model, structure)
+    name = problem.locate or structure
     expected_pattern = next((p for p in patterns if p.name == name), None)
     stored_design = enclose_stored(problem, design)
     if stored_design is None:
@@ -268,9 +269,13 @@ def _prove_first(
 def _candidate_patterns(problem: Posed, structure: str, roots: Sequence[Root]) -> list[Pattern]:
     """List the patterns to prove: those of the roots, if they imply the located pattern, and then the located one."""
     target = problem.pattern
-    quartic = PATTERNS if problem.model.degree == _QUARTIC else {}
-    patterns = find_patterns(roots) if roots else [quartic[structure]] if structure in quartic else []
-    if target and not (has_pattern(roots, target.form) if roots else target.form == structure):
+    if not has_real_form(problem.model):
+        return [target] if target else []
+    form = real_form(problem)
+    quartic = PATTERNS if form.problem.model.degree == _QUARTIC and form.carrier is None else {}
+    real_roots = form.real_roots(roots)
+    patterns = find_patterns(real_roots) if roots else [quartic[structure]] if structure in quartic else []
+    if target and not (has_pattern(real_roots, target.form) if roots else target.form == form.real_name(structure)):
         patterns = []
     user_patterns = [quartic.get(p.name, p) for p in patterns]
     if problem.model.is_complex:
@@ -280,23 +285,25 @@ def _candidate_patterns(problem: Posed, structure: str, roots: Sequence[Root]) -
 
 def _exact_patterns(problem: Posed, design: ExactDesign) -> list[Pattern]:
     """The pattern of all multiple roots of a design in fractions, if any."""
-    a = design.coefficients(problem.model, problem.parameter_set)
+    if not has_real_form(problem.model):
+        return []
+    form = real_form(problem)
+    a = design.coefficients(form.problem.model, problem.parameter_set)
     name = multiple_roots(a) if a else ""
-    return [pattern_of(problem.model, user_structure_name(problem.model, name))] if name else []
+    return [pattern_of(problem.model, form.user_name(name))] if name else []
 
 
 def _simple_doubts(problem: Posed, structure: str, proved_design: ProvedDesign) -> list[str]:
     """List why the structure of a design without multiple roots is not proved; empty if it is proved."""
-    pattern_name = user_structure_name(problem.model, structure)
     if structure not in _SIMPLE_CLAIMS:
-        return [f"double precision cannot decide the structure {pattern_name}; locate the pattern you expect"]
+        return [f"double precision cannot decide the structure {structure}; locate the pattern you expect"]
     roots = proved_design.factorisation.roots
     if roots is None:
         return ["some roots are equal or too close to isolate; locate the pattern you expect"]
     other_roots = roots[1:] if roots[0].is_real else roots[2:]
     if roots[0].is_real == (structure == "real") and all(z.re < roots[0].re for z in other_roots):
         return []
-    return [f"the rightmost root of the design as stored is not certainly {pattern_name}"]
+    return [f"the rightmost root of the design as stored is not certainly {structure}"]
 
 
 def _assemble(
@@ -316,15 +323,15 @@ def _assemble(
         else fraction(exact_value, digits)
         for n, ball in proved_design.parameters.items()
     }
-    has_all_roots = problem.model.polynomial is not None  # of large matrices only the multiple roots are enclosed
+    has_all_roots = has_real_form(problem.model)  # of large matrices only the multiple roots are enclosed
     abscissa = proved_design.factorisation.abscissa if has_all_roots else None
     is_real = not problem.model.is_complex
     # For a complex H, these are unknowns of a real matrix that the user did not state.
     hidden_unknowns = () if is_real or pattern is None else pattern.unknowns
     hidden_unknowns = (*hidden_unknowns, *(f"{pattern.name}.{n}" for n in hidden_unknowns)) if pattern else ()
-    roots = user_roots(problem.model, proved_design.factorisation.roots or ())
-    if not has_all_roots:
-        roots = proved_design.chain_roots
+    roots = proved_design.chain_roots
+    if has_all_roots:
+        roots = real_form(problem).user_roots(proved_design.factorisation.roots or ())
     geometric_multiplicity, defective = eigenvector_verdict(problem, design, proved_design)
     if not reasons and geometric_multiplicity is not None and geometric_multiplicity > 1 and "EP" in name:
         reasons = [f"{'not an EP' if defective.holds else CROSSING}: {defective.words}"]

@@ -45,7 +45,7 @@ def spectrum(matrices: Complex, tolerance: float, is_complex: bool) -> Structure
     size = float(np.linalg.norm(M, 2)) or 1.0
     found = [*_split(form, _connect(eigenvalues), [*range(len(eigenvalues))], tolerance, size)]
     zero = 4 * np.finfo(float).eps * size
-    roots = [Root(_drop(z.real, zero), z.imag if is_complex else _drop(z.imag, tolerance * size), k) for z, k in found]
+    roots = [Root(_drop(z.real, zero), _drop(z.imag, zero if is_complex else tolerance * size), k) for z, k in found]
     if not is_complex:  # the two of a pair differ by their rounding only
         upper = [root for root in roots if root.im >= 0]
         roots = [

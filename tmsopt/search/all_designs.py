@@ -16,6 +16,7 @@ from tmsopt.global_search import Completeness, prove_completeness
 from tmsopt.global_search.chain_equations import MAX_PROVED_SIZE, prove_point
 from tmsopt.global_search.completeness import SECONDS
 from tmsopt.problem import Posed, ProblemSource, Solution, degrees_of_freedom, pose
+from tmsopt.problem.real_form import has_real_form, real_form
 from tmsopt.problem.symmetry import reduce_problem
 from tmsopt.problem.validate import MIN_SIZE
 from tmsopt.program import NLP, CommonOptions, Options, formulate_matching, make_options
@@ -155,7 +156,7 @@ def solve_all(problem: ProblemSource, *, seconds: float = SECONDS, **options: Un
     own_options = make_options(options, defaults=_DEFAULTS)
     begin(own_options.progress, "proving that no design is missed", "s")
     proof = prove_all_points(problem) if seconds > 0 else None
-    if proof is None and seconds > 0 and problem.model.polynomial is not None:
+    if proof is None and seconds > 0 and has_real_form(problem.model):
         proof = _prove_completeness(problem, seconds, own_options.progress)
     proved_entries = list[_IsolatedDesign]()
     for intervals in proof.designs if proof else ():
@@ -170,7 +171,7 @@ def solve_all(problem: ProblemSource, *, seconds: float = SECONDS, **options: Un
     ]
     if coverage:
         coverage = replace(coverage, hits=(*coverage.hits, *[0] * len(proof_only_entries)))
-    can_prove = seconds > 0 and has_chains(problem) and problem.model.size <= MAX_PROVED_SIZE
+    can_prove = seconds > 0 and has_chains(problem) and problem.model.degree <= MAX_PROVED_SIZE
     solutions, proved_flags, bounds = list[Solution](), list[bool](), list[Table[float]]()
     for entry in (*search_entries, *proof_only_entries):
         solution = _make_solution(problem, entry.design)
@@ -248,6 +249,7 @@ def _search_starts(problem: Posed, options: Options) -> tuple[list[_IsolatedDesi
 
 def _find_factor_ends(problem: Posed, options: Options) -> Iterator[list[_End]]:
     """The ends of Newton's method on the factors, and of IPOPT, for each start."""
+    problem = real_form(problem).problem
     nlp = _build_equations(problem)
     state, system = SearchState(problem, problem, nlp, options), build_square_system(nlp)
     assert system is not None  # as many conditions as parameters
@@ -297,7 +299,7 @@ def _prove_completeness(problem: Posed, seconds: float, progress: ReportCount | 
     limits = [limit for d, limit in zip(proof.designs, proof.limits, strict=True) if d in designs]
     proof = replace(proof, designs=tuple(designs), limits=tuple(limits))
     order = max(c for _, c, _ in composition(str(problem.pattern and problem.pattern.name)))
-    if proof.complete and 2 * order <= problem.model.size:
+    if proof.complete and 2 * order <= problem.model.degree:
         reason = (
             "points at which two conjugate eigenfrequencies are multiple, off the line of symmetry, are not excluded"
         )

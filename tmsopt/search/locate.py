@@ -18,6 +18,7 @@ from tmsopt.chains import (
 )
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem import Posed, Starts, degrees_of_freedom
+from tmsopt.problem.real_form import has_real_form
 from tmsopt.problem.solution import OtherBranch
 from tmsopt.program import Options
 from tmsopt.program.formulate import default_start
@@ -118,7 +119,7 @@ def locate_by_chains(
 
 def _fail(problem: Posed, p: Array, start_count: int) -> Outcome | None:
     """The outcome if no start leads to a solution; None if the search by factors can follow."""
-    if problem.model.polynomial is not None:
+    if has_real_form(problem.model):
         return None
     assert problem.pattern is not None
     design = problem.ordered(dict(zip(problem.free, p.tolist(), strict=True)))

@@ -15,7 +15,7 @@ from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.evaluation.exclusion import bound_without_search
 from tmsopt.evaluation.recheck import Evaluation
 from tmsopt.evaluation.stored import find_storable_design
-from tmsopt.models.user_spectrum import distance_beyond_axis, polynomial_structure, remove_rounding, user_structure_name
+from tmsopt.models.user_spectrum import distance_beyond_axis
 from tmsopt.problem import (
     Bound,
     NotSolved,
@@ -28,8 +28,8 @@ from tmsopt.problem import (
     unit_of,
 )
 from tmsopt.problem.dependence import sense_notes
-from tmsopt.problem.evaluate import require_polynomial
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
+from tmsopt.problem.real_form import real_form
 from tmsopt.problem.symmetry import find_symmetry
 from tmsopt.problem.verdict.stability import stability
 from tmsopt.program import DEFAULTS, Options, SolveOptions, make_options, objective_size
@@ -130,8 +130,29 @@ def solve_any_status(
         and (outcome := locate_by_chains(problem, options, extra_starts))
     ):
         return _assemble(problem, outcome, sense_notes(problem), {}, began, with_bound)
-    require_polynomial(problem)
+    form = real_form(problem)
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
+    solution = _search_box(form.problem, options, extra_starts, skipped_parts, with_bound, policy)
+    if not (without_sample or solution.interrupted):
+        solution = add_worst_case_proof(solution)
+    if options.stability and not (solution.interrupted or options.near):
+        solution = _seek_stability(solution, options, began, policy)
+    if form.problem is problem:
+        return solution
+    solution = form.to_user(solution, problem)
+    return replace(solution, notes=(*solution.notes, *_describe_hermitian(problem)))
+
+
+def _search_box(
+    problem: Posed,
+    options: Options,
+    extra_starts: Sequence[Mapping[str, float]],
+    skipped_parts: Collection[str],
+    with_bound: bool,
+    policy: Policy,
+) -> Solution:
+    """Search the parts of the box by factors of the polynomial; the arguments are those of `solve_any_status`."""
+    began = time.perf_counter()
     states = [
         s for s in begin_search(problem, options, tuple(extra_starts), policy.tuning) if s.side not in skipped_parts
     ]
@@ -148,18 +169,17 @@ def solve_any_status(
     sampled_count = sum(len(state.sample.box.draws) for state, _ in searched_parts if state.sample)
     outcome = replace(outcome, starts=replace(outcome.starts, looked=sampled_count))
     notes = (*_describe_sides(problem, searched_parts, outcome), *sense_notes(problem))
-    if problem.locate and "EP" in problem.locate and problem.model.is_complex and find_symmetry(problem).is_hermitian:
-        notes = (*notes, "H is Hermitian up to a multiple of 1 for all parameters, so it has no exceptional point")
     objective_by_side = {
         state.side: o.checked.objective if o and o.status == "optimal" else math.nan
         for state, o in searched_parts
         if state.side
     }
     solution = _assemble(problem, outcome, notes, objective_by_side, began, with_bound)
-    solution = replace(solution, interrupted=is_interrupted)
-    solution = solution if without_sample else add_worst_case_proof(solution)
-    if is_interrupted or not options.stability or options.near:
-        return solution
+    return replace(solution, interrupted=is_interrupted)
+
+
+def _seek_stability(solution: Solution, options: Options, began: float, policy: Policy) -> Solution:
+    """Search for a stable design and for the speed that it needs, if stability was sought and not reached."""
     try:
         solution = _search_stable_design(solution, options, began, policy)
         return add_required_speed(solution, options)
@@ -168,6 +188,13 @@ def solve_any_status(
             raise
         words = "the user stopped the search for a stable design"
         return replace(solution, interrupted=True, notes=(*solution.notes, words))
+
+
+def _describe_hermitian(problem: Posed) -> tuple[str, ...]:
+    """A note if an exceptional point of a Hermitian matrix is sought."""
+    if not (problem.locate and "EP" in problem.locate and find_symmetry(problem).is_hermitian):
+        return ()
+    return ("H is Hermitian up to a multiple of 1 for all parameters, so it has no exceptional point",)
 
 
 def _check_near(problem: Posed, near: Mapping[str, float]) -> None:
@@ -325,11 +352,9 @@ def _assemble(
     if outcome.status == "optimal" and problem.free and problem.objective is not None and not is_confirmed:
         outcome = replace(outcome, status="not_converged", notes=(*outcome.notes, UNCLEAR))
     is_optimal, has_cases = outcome.status == "optimal", bool(problem.scenarios or problem.tolerances)
-    name = user_structure_name(problem.model, checked.structure.name)
     worst_parameters = checked.worst.applied(parameters)
-    all_roots = polynomial_structure(problem.model, name, numbers.roots).roots
     multiple_roots = all_meetings(
-        problem, worst_parameters, all_roots, () if checked.is_crossing else checked.violations
+        problem, worst_parameters, numbers.roots, () if checked.is_crossing else checked.violations
     )
     edges, is_certain = find_edges(
         problem, worst_parameters, checked.structure, is_optimal, numbers.abscissa, multiple_roots
@@ -341,8 +366,8 @@ def _assemble(
         parameters=Table(outcome.parameters),
         abscissa=numbers.abscissa,
         abscissa_realised=numbers.abscissa_realised,
-        roots=remove_rounding(problem.model, numbers.roots),
-        structure=name,
+        roots=numbers.roots,
+        structure=checked.structure.name,
         active=Table(outcome.active_gains),
         violations=checked.amounts,
         missed=Table(rounding_excess),
@@ -370,7 +395,7 @@ def _assemble(
         edge_is_exact=is_certain,
         multiple_as_rounded=bool(multiple_roots)
         and not problem.free
-        and not is_exactly_multiple(problem, worst_parameters, all_roots),
+        and not is_exactly_multiple(problem, worst_parameters, numbers.roots),
         without_best=outcome.has_no_best_design,
         si=numbers.si,
     )
@@ -389,8 +414,9 @@ def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str
     unstable_note = (UNSTABLE,) if violated_limits and checked.structure.abscissa >= 0 else ()
     real_part = distance_beyond_axis(problem.model, problem.located, checked.structure.roots) if is_optimal else None
     if real_part:
-        words = "root has real part" if not problem.model.is_complex else "eigenfrequency has gain"
-        return (f"not the edge of stability: another {words} {unit_of(problem, 'abscissa').show(real_part, 2)}",)
+        return (
+            f"not the edge of stability: another root has real part {unit_of(problem, 'abscissa').show(real_part, 2)}",
+        )
     if unstable_note or not is_optimal or checked.structure.abscissa < 0:
         return unstable_note
     largest = max((r.size for r in checked.structure.roots), default=0.0)

@@ -1,14 +1,13 @@
 """Characteristic polynomial and matrix polynomial of a system whose entries are nodes (parts of formulas)."""
 
 from collections.abc import Iterable
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from tmsopt.models.model import Matrices, Matrix
-from tmsopt.models.stated.pairs import Pair, pair
-from tmsopt.roots.polynomial import characteristic_polynomial, product, quadratic_pencil
+from tmsopt.models.stated.pairs import Pair
+from tmsopt.roots.polynomial import characteristic_polynomial, quadratic_pencil
 
 IMAGINARY = ", imaginary part"
 """Suffix of the key of the imaginary part of a complex matrix; the key without it has the real part."""
@@ -39,28 +38,17 @@ def sort_places(is_complex: bool, places: Iterable[tuple[str, str]]) -> list[tup
     return sorted(listed, key=lambda place: (keys.index(user_key(place[0])), place[1]))
 
 
-def polynomial(kind: str, blocks: dict[str, Matrix], carrier: float = 0.0) -> list[Any]:
+def polynomial(kind: str, blocks: dict[str, Matrix]) -> list[Any]:
     """Coefficients of the characteristic polynomial, descending.
 
     Args:
         blocks: key → matrix.
-        carrier: real constant that is added to the eigenfrequencies of H.
     """
     if kind == "coefficients":
         return blocks["coefficients"][0]
-    if kind == "hamiltonian":
-        return _real_polynomial(blocks["H"], carrier)
     if "A" in blocks:
         return characteristic_polynomial(blocks["A"])
     return quadratic_pencil(*pencil(blocks))
-
-
-def _real_polynomial(H: Matrix, carrier: float) -> list[Any]:
-    """|det(s + i (H + carrier))|² for real s; its roots are −i (ω + carrier) and their conjugates."""
-    rows = [[Pair(x.im, -x.re - Fraction(carrier) * (i == j)) for j, x in enumerate(row)] for i, row in enumerate(H)]
-    coefficients = [pair(x) for x in characteristic_polynomial(rows)]
-    re, im = [x.re for x in coefficients], [x.im for x in coefficients]
-    return [a + b for a, b in zip(product(re, re), product(im, im), strict=True)]
 
 
 def pencil(blocks: dict[str, Matrix]) -> Matrices:

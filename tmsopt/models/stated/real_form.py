@@ -4,23 +4,25 @@ A carrier, a real constant, is added to all eigenfrequencies, so that no root me
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import product
+from fractions import Fraction
+from functools import lru_cache
+from itertools import product as combinations
 from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import Formula, Node, UnsupportedOperation, formula
+from tmsopt.algebra.formula import Formula, Node, UnsupportedOperation, constant, formula, symbol
 from tmsopt.algebra.intervals import Interval, ranges
 from tmsopt.algebra.kinds import values
-from tmsopt.models.model import Model
-from tmsopt.records import Array
+from tmsopt.models.model import Matrices, Matrix, Model
+from tmsopt.models.stated.pairs import Pair, list_parts, pair
+from tmsopt.records import AnyNumbers, Array
+from tmsopt.roots.polynomial import characteristic_polynomial, product
 
 # The spread is the largest distance of Re ω from the middle of all Re ω, and at least the largest |Im ω|.
 
-_MAX_DISTANCE = 16  # a carrier is used for other ranges, too, if no root is farther from the axis than so many spreads
-_MIN_DISTANCE = 0.9  # least distance of the roots from the axis, in spreads
 _NEGLIGIBLE = 2.0**-300  # a smaller spread comes from rounding, and its carrier would underflow
 _MIN_SPREAD = 1e-6  # least spread, relative to the largest frequency; a smaller one would not save digits
 _SAMPLE_SIZE = 256  # designs of a sample of the ranges
@@ -48,37 +50,50 @@ CONVENTIONS = (
 )
 
 
-def complex_model(
-    real_model: Model,
-    carrier: float,
-    bounds: Callable[[Mapping[str, Interval]], tuple[float, float]],
-    with_carrier: Callable[[float], Model],
-) -> Model:
-    """The model of a complex H from the model of its real system.
+def choose_carrier(model: Model, box: Mapping[str, Interval]) -> float:
+    """The carrier for the eigenfrequencies of a complex system x′ = A x with native parameters in a box."""
+    names = model.sets[0].names
+    entries = [constant(x) for x in list_parts([_state_matrix(model)])]
+    return carrier_for(*_bound_frequencies(entries, {n: box[n] for n in names}))
 
-    Args:
-        real: the model of the real system with the carrier.
-        bounds: function from ranges of parameters to the middle and the spread of the eigenfrequencies.
-        with_carrier: function from a carrier to the model of H with this carrier.
+
+@lru_cache(maxsize=64)
+def real_model(model: Model, carrier: float) -> Model:
+    """The real system of twice the size of a complex system x′ = A x, with the carrier c.
+
+    Its polynomial is |det(s − A + i c)|² for real s. The roots are those of A minus i c, and their conjugates.
     """
+    names, A = model.sets[0].names, _state_matrix(model)
+    n = len(A)
+    A = [[x - Pair(0, Fraction(carrier)) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(A)]
+    coefficients = [pair(x) for x in characteristic_polynomial(A)]
+    re, im = [x.re for x in coefficients], [x.im for x in coefficients]
+    polynomial = formula([a + b for a, b in zip(product(re, re), product(im, im), strict=True)], names)
+    rows = [[(-x.re, x.im) for x in row] for row in A]
+    doubled = [[*(a for a, _ in row), *(b for _, b in row)] for row in rows]
+    doubled += [[*(-b for _, b in row), *(a for a, _ in row)] for row in rows]
+    matrices = formula([x for row in doubled for x in row], names)
 
-    def choose_carrier(box: Mapping[str, Interval]) -> Model:
-        middle, spread = bounds(box)
-        lowest, highest = middle + carrier - spread, middle + carrier + spread
-        if carrier and lowest >= _MIN_DISTANCE * spread and highest <= _MAX_DISTANCE * spread:
-            return model
-        return with_carrier(carrier_for(middle, spread))
+    def pencil(numbers: AnyNumbers) -> Matrices:
+        entries = values(matrices, numbers)
+        return np.eye(2 * n, dtype=int).tolist(), [entries[k : k + 2 * n] for k in range(0, len(entries), 2 * n)]
 
-    model = replace(
-        real_model,
-        is_complex=True,
-        carrier=carrier,
-        carried=choose_carrier,
-        words=WORDS,
-        absent=ABSENT,
-        conventions=CONVENTIONS,
+    return replace(
+        model,
+        degree=2 * n,
+        polynomial=lambda **numbers: values(polynomial, numbers),
+        pencil=pencil,
+        origin=(real_model, (model, carrier)),
+        statement=None,
+        is_complex=False,
     )
-    return model
+
+
+def _state_matrix(model: Model) -> Matrix:
+    """A of x′ = A x, as pairs of nodes of the native parameters."""
+    assert model.pencil is not None
+    _, rows = model.pencil({n: symbol(n) for n in model.sets[0].names})
+    return [[-pair(x) for x in row] for row in rows]
 
 
 def carrier_for(middle: float, spread: float) -> float:
@@ -88,51 +103,48 @@ def carrier_for(middle: float, spread: float) -> float:
     return distance - step * round(middle / step)
 
 
-def frequency_bounds(entries: Sequence[Node]) -> Callable[[Mapping[str, Interval]], tuple[float, float]]:
-    """A function from parameter ranges to the middle and the spread of Re ω; the spread is at least max |Im ω|.
+def _bound_frequencies(entries: Sequence[Node], box: Mapping[str, Interval]) -> tuple[float, float]:
+    """The middle and the spread of Re ω = −Im s; the spread is at least max |Im ω|.
 
-    Re ω and Im ω lie in the ranges of the eigenvalues of (H + H*)/2 and (H − H*)/2i. Gershgorin's discs bound these
+    Re s and Im s lie in the ranges of the eigenvalues of (A + A*)/2 and (A − A*)/2i. Gershgorin's discs bound these
     eigenvalues. Intervals bound the entries, or a sample if intervals give no bound, as for 1/x. The discs may be far
     too wide, and a large carrier costs digits, so the eigenvalues at a sample of designs show the actual spread. This
     is safe: a root meets the conjugate of another root only if the true spread is more than twice as large.
+
+    Args:
+        entries: real and imaginary part of each entry of A.
     """
-    n = math.isqrt(len(entries) // 2)
-    R, J = (np.array(part, dtype=object).reshape(n, n) for part in (entries[: n * n], entries[n * n :]))
+    matrix, intervals, n = formula(entries, box), [*box.values()], math.isqrt(len(entries) // 2)
+    R, J = (np.array(part, dtype=object).reshape(n, n) for part in (entries[::2], entries[1::2]))
     is_off_diagonal = ~np.eye(n, dtype=bool)
-    off_diagonal = [x for P in (R + R.T, J - J.T, J + J.T, R - R.T) for x in (P / 2)[is_off_diagonal]]
-    matrix = formula(entries)
-    disc_parts = formula([*R.diagonal(), *J.diagonal(), *off_diagonal], matrix.names)
-
-    def bounds(box: Mapping[str, Interval]) -> tuple[float, float]:
-        intervals = [box[name] for name in matrix.names]
-        part_ranges = np.array(_bound_outputs(disc_parts, intervals))
-        sizes = np.split(np.abs(part_ranges[2 * n :]).max(axis=1), 4) if off_diagonal else [np.zeros(0)] * 4
-        ends = []
-        for diagonal, re, im in ((part_ranges[:n], *sizes[:2]), (part_ranges[n : 2 * n], *sizes[2:])):
-            radius = np.hypot(re, im).reshape(n, -1).sum(axis=1)
-            ends.append(((diagonal[:, 0] - radius).min(), (diagonal[:, 1] + radius).max()))
-        (low, high), loss = ends[0], np.abs(ends[1]).max()
-        spread = float(max((high - low) / 2, loss))
-        sample = _sample_frequencies(matrix, n, intervals) if any(lo < hi for lo, hi in intervals) else np.zeros(0)
-        if sample.size:
-            sample_low, sample_high = sample.real.min(), sample.real.max()
-            sample_spread = _SPREAD_FACTOR * max((sample_high - sample_low) / 2, np.abs(sample.imag).max())
-            if sample_spread < spread:
-                low, high, spread = sample_low, sample_high, float(max(sample_spread, _MIN_SHARE * spread))
-        spread = max(spread, _MIN_SPREAD * max(abs(low), abs(high)))  # equal entries have a spread from rounding only
-        return float(low + high) / 2, spread if spread > _NEGLIGIBLE else 1.0
-
-    return bounds
+    off_diagonal = [x for P in (J + J.T, R - R.T, R + R.T, J - J.T) for x in (P / 2)[is_off_diagonal]]
+    disc_parts = formula([*-J.diagonal(), *R.diagonal(), *off_diagonal], matrix.names)
+    part_ranges = np.array(_bound_outputs(disc_parts, intervals))
+    sizes = np.split(np.abs(part_ranges[2 * n :]).max(axis=1), 4) if off_diagonal else [np.zeros(0)] * 4
+    ends = []
+    for diagonal, re, im in ((part_ranges[:n], *sizes[:2]), (part_ranges[n : 2 * n], *sizes[2:])):
+        radius = np.hypot(re, im).reshape(n, -1).sum(axis=1)
+        ends.append(((diagonal[:, 0] - radius).min(), (diagonal[:, 1] + radius).max()))
+    (low, high), loss = ends[0], np.abs(ends[1]).max()
+    spread = float(max((high - low) / 2, loss))
+    sample = _sample_frequencies(matrix, n, intervals) if any(lo < hi for lo, hi in intervals) else np.zeros(0)
+    if sample.size:
+        sample_low, sample_high = sample.real.min(), sample.real.max()
+        sample_spread = _SPREAD_FACTOR * max((sample_high - sample_low) / 2, np.abs(sample.imag).max())
+        if sample_spread < spread:
+            low, high, spread = sample_low, sample_high, float(max(sample_spread, _MIN_SHARE * spread))
+    spread = max(spread, _MIN_SPREAD * max(abs(low), abs(high)))  # equal entries have a spread from rounding only
+    return float(low + high) / 2, spread if spread > _NEGLIGIBLE else 1.0
 
 
 def _sample_frequencies(matrix: Formula, n: int, box: Sequence[Interval]) -> Any:
-    """Eigenvalues of H at designs in a box, with its corners if they are few; empty if H is not finite there."""
+    """ω at designs in a box, with its corners if they are few; empty if A is not finite there."""
     points = _unit_points(len(box))
     if len(box) <= _MAX_CORNER_PARAMETERS:
-        points = np.concatenate([points, np.array(list(product((0.0, 1.0), repeat=len(box))))])
+        points = np.concatenate([points, np.array(list(combinations((0.0, 1.0), repeat=len(box))))])
     entries = _evaluate(matrix, box, points)
-    H = (entries[: n * n] + 1j * entries[n * n :]).T.reshape(-1, n, n)
-    return np.linalg.eigvals(H) if np.isfinite(H).all() else np.zeros(0)
+    A = (entries[::2] + 1j * entries[1::2]).T.reshape(-1, n, n)
+    return 1j * np.linalg.eigvals(A) if np.isfinite(A).all() else np.zeros(0)
 
 
 def _evaluate(outputs: Formula, box: Sequence[Interval], points: Array) -> Array:

@@ -35,7 +35,7 @@ from tmsopt.models.stated.closed_loop import LOOP_KEYS, check_loop, close_loop
 from tmsopt.models.stated.degree import first_fault
 from tmsopt.models.stated.equations import IMAGINARY, join_parts, pencil, polynomial, sort_places, user_key
 from tmsopt.models.stated.pairs import Pair, complex_text, join
-from tmsopt.models.stated.real_form import ABSENT, CONVENTIONS, WORDS, complex_model, frequency_bounds
+from tmsopt.models.stated.real_form import ABSENT, CONVENTIONS, WORDS
 from tmsopt.models.stated.texts import Unfit, are_complex, describe_position, parse_entries
 from tmsopt.records import AnyNumbers
 
@@ -45,8 +45,8 @@ _ACCEPTED_NUMBERS = "accepted: finite numbers, and expressions of them"
 _MAX_SIZE = dict.fromkeys("MDK", 50) | dict.fromkeys("AH", 100) | dict.fromkeys(("coefficients", *LOOP_KEYS), 12)
 """Key → largest number of rows and columns of a matrix; for coefficients, largest degree."""
 
-_MAX_POLYNOMIAL_SIZE = dict.fromkeys("MDKH", 6) | {"A": 12}
-"""Key → largest number of rows of a matrix whose characteristic polynomial is used."""
+_MAX_POLYNOMIAL_SIZE = dict.fromkeys("MDK", 6) | {"A": 12}
+"""Key → largest number of rows of a real matrix whose characteristic polynomial is used."""
 
 _Shape = tuple[str, int, int]  # key, number of rows and number of columns of a matrix
 _SAMPLES = 24  # a coefficient that is 0 at so many designs is then tested exactly
@@ -238,7 +238,6 @@ def _build_from_data(
     shapes: tuple[_Shape, ...],
     quantity_names: tuple[str, ...],
     entry_formula: Formula,
-    carrier: float = 0.0,
 ) -> Model:
     """A model from plain data. Each process has one object for each model.
 
@@ -253,13 +252,11 @@ def _build_from_data(
     is_complex = any(n.endswith(IMAGINARY) for n, *_ in shapes)
     matrices = None if kind == "coefficients" and not is_complex else pencil(blocks)
     coefficients, degree = None, (len(matrices) - 1) * len(matrices[0]) if matrices else 0
-    is_small = matrices is None or len(matrices[0]) <= _MAX_POLYNOMIAL_SIZE.get(shapes[0][0], 0)
-    if is_small and (kind == "hamiltonian" or not is_complex):
-        coefficients = _find_polynomial(kind, shapes[0][0], blocks, names, carrier)
+    if not is_complex and (matrices is None or len(matrices[0]) <= _MAX_POLYNOMIAL_SIZE[shapes[0][0]]):
+        coefficients = _find_polynomial(kind, shapes[0][0], blocks, names)
         degree = len(coefficients.outputs) - 1
     quantities = zip(quantity_names, remaining_entries, strict=True)
     parameters = tuple(Parameter(n, "1", "parameter", latex(n)) for n in names)
-    arguments = (kind, name, shapes, quantity_names, entry_formula)
     model = Model(
         name=name,
         title=name,
@@ -269,25 +266,18 @@ def _build_from_data(
         polynomial=None if coefficients is None else lambda **numbers: values(coefficients, numbers),
         quantities=tuple(Quantity(n, "1", "quantity", latex(n), _make_function(x, names)) for n, x in quantities),
         pencil=None if matrices is None else _matrices(matrices, names),
-        origin=(_build_from_data, (*arguments, carrier) if carrier else arguments),
+        origin=(_build_from_data, (kind, name, shapes, quantity_names, entry_formula)),
         statement=_statement(entry_formula, shapes, quantity_names),
         numbers=tuple(number_text(x) for x in entry_formula.constants if getattr(x, "denominator", 0) != 1),
     )
     if not is_complex:
         return model
-    if coefficients is None:
-        return replace(model, is_complex=True, words=WORDS, absent=ABSENT, conventions=CONVENTIONS)
-    return complex_model(
-        model,
-        carrier,
-        frequency_bounds(entries[: len(entries) - len(quantity_names)]),
-        lambda c: _build_from_data(*arguments, *([c] if c else [])),
-    )
+    return replace(model, is_complex=True, words=WORDS, absent=ABSENT, conventions=CONVENTIONS)
 
 
-def _find_polynomial(kind: str, key: str, blocks: dict[str, Matrix], names: Sequence[str], carrier: float) -> Formula:
+def _find_polynomial(kind: str, key: str, blocks: dict[str, Matrix], names: Sequence[str]) -> Formula:
     """The coefficients of the characteristic polynomial, without leading ones that are 0 for all parameters."""
-    all_coefficients = polynomial(kind, blocks, carrier)
+    all_coefficients = polynomial(kind, blocks)
     zero_count = _leading_zeros(formula(all_coefficients, names))
     zero_count = zero_count and _count_identical_zeros(kind, blocks, names, zero_count)
     if zero_count == len(all_coefficients) - 1:

@@ -7,7 +7,6 @@ from operator import itemgetter
 from tmsopt.errors import find_similar, suggest
 from tmsopt.models import MODELS, Model, Parameter, ParameterSet, Quantity
 from tmsopt.models.tables import read_table
-from tmsopt.models.user_spectrum import public_names
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, ROOT_QUANTITIES, root_names
 
 _MIN_SIMILARITY = 0.7  # if no name is at least this similar to an unknown name, the meanings are searched first
@@ -31,7 +30,7 @@ def vocabulary(model: Model, parameter_set: ParameterSet) -> dict[str, Parameter
     entries |= {p.name: p for p in (*native, *parameter_set.parameters)} | {q.name: q for q in derived_quantities}
     if model.is_complex:
         entries["abscissa"] = replace(ROOT_QUANTITIES[0], meaning="largest Im omega, gain less loss")
-    names = (*parameter_set.names, *public_names(model, parameter_set), *root_names(model))
+    names = (*parameter_set.names, *model.quantity_names(parameter_set), *root_names(model))
     return {name: entries[name] for name in names}
 
 
