@@ -328,6 +328,11 @@ class Model:
         return formulas
 
     @property
+    def has_real_polynomial(self) -> bool:
+        """Whether roots are those of a polynomial; else they are eigenvalues of complex or large matrices."""
+        return self.polynomial is not None and not self.is_complex
+
+    @property
     def is_doubled(self) -> bool:
         """Whether the polynomial is that of a real system of twice the size, for a complex H."""
         return self.is_complex and self.polynomial is not None
