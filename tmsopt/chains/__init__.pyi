@@ -6,5 +6,5 @@ from .meetings import (
 )
 from .points import (
     ExceptionalPoint as ExceptionalPoint, Target as Target, find_point as find_point, measure_point as measure_point,
-    refine_near as refine_near, targets_of as targets_of,
+    refine as refine, refine_near as refine_near, targets_of as targets_of,
 )

@@ -21,6 +21,7 @@ from tmsopt.documents.blocks import (
 from tmsopt.documents.design_rows import format_frequency, format_multiplicity, format_root
 from tmsopt.documents.tables import tabulate_records
 from tmsopt.dynamics.crossings import Crossing, Stretch
+from tmsopt.dynamics.eigenvalue_crossings import choose_grid_size
 from tmsopt.dynamics.growth import Growth
 from tmsopt.dynamics.speeds import Speeds, speed_of
 from tmsopt.models import in_words_of
@@ -192,7 +193,11 @@ def write_speeds(speeds: Speeds, level: Level) -> Parts:
     if math.isfinite(speeds.upper):
         range_text = f"{unit.number(speeds.lower, 6)} < {speeds.parameter} < {unit.show(speeds.upper, 6)}"
     yield Chapter("range", "Answer")
-    yield f"{range_text}, by exact root isolation, with the parameters in double precision"
+    if speeds.is_exact:
+        yield f"{range_text}, by exact root isolation, with the parameters in double precision"
+    else:
+        count = choose_grid_size(speeds.problem.model.degree)
+        yield f"{range_text}, by eigenvalues at {count} values and Newton steps; nothing is proved between these values"
     yield Sentence(speeds.problem.model.omits, "model")
     yield Chapter("speeds", "Critical speeds", "wide")
     yield _tabulate_crossings(speeds, unit, has_roots)

@@ -8,14 +8,13 @@ close to another one. Factors that are present for every y, such as s for a root
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import flint
 
 from tmsopt.algebra.balls import rational
-from tmsopt.problem.real_form import RealForm
 from tmsopt.roots.exact import exact_roots
 from tmsopt.roots.polynomial import Root
 from tmsopt.roots.stability import lienard_chipart
@@ -109,24 +108,12 @@ def find_crossings(coefficients: Sequence[Polynomial], lower: Any, upper: Any, b
     )
     return Crossings(
         () if bands_only else tuple(found),
-        _merge_bands(cells, stable),
-        _merge_bands(cells, damped),
+        merge_bands(cells, stable),
+        merge_bands(cells, damped),
         tuple(kind for kind, holds in ({"infinity": len(a) < len(coefficients)} | is_permanent).items() if holds),
-        _merge_bands(cells, marginal),
+        merge_bands(cells, marginal),
         split.zeros,
     )
-
-
-def user_crossings(form: RealForm, crossings: Crossings) -> Crossings:
-    """The crossings as the user sees them. For a complex system, they are crossings of its eigenfrequencies."""
-    if form.carrier is None:
-        return crossings
-    user_found = tuple(
-        replace(c, kind=form.user_name(c.kind), root=form.user_roots([replace(c.root, im=-c.root.im)])[0])
-        for c in crossings.found
-        if c.kind not in ("capsize", "infinity")
-    )
-    return replace(crossings, found=user_found, heavily_damped=())
 
 
 @dataclass(frozen=True)
@@ -287,7 +274,7 @@ def _list_cells(critical_values: Sequence[Any], lower: Any, upper: Any | None) -
             yield float(low), float(high), (low + high) / 2
 
 
-def _merge_bands(cells: Sequence[tuple[float, float, Any]], is_inside: Sequence[bool]) -> tuple[Stretch, ...]:
+def merge_bands(cells: Sequence[tuple[float, float, Any]], is_inside: Sequence[bool]) -> tuple[Stretch, ...]:
     """The intervals that are inside. Adjacent intervals are merged, even if the point between them is not inside."""
     bands: list[Stretch] = []
     for (low, high, _), is_cell_inside in zip(cells, is_inside, strict=True):

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tmsopt.dynamics.crossings import Crossing, Crossings, Stretch, find_crossings, user_crossings
+from tmsopt.dynamics.crossings import Crossing, Crossings, Stretch, find_crossings
+from tmsopt.dynamics.eigenvalue_crossings import choose_grid_size, find_eigenvalue_crossings
 from tmsopt.dynamics.modes import Mode, follow_modes
 from tmsopt.dynamics.speeds import coefficients_over, speed_of
 from tmsopt.dynamics.system import is_bicycle
@@ -19,7 +20,6 @@ from tmsopt.models import Model, Parameter, ParameterSet, Values
 from tmsopt.problem.evaluate import find_eigenvalues
 from tmsopt.problem.files import ProblemSource
 from tmsopt.problem.problem import Problem
-from tmsopt.problem.real_form import real_form
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import AnyNumbers, Array, Complex, Tabular, Truth, plain
@@ -35,6 +35,7 @@ _HALVINGS = 60  # number of halvings of a step of the grid, until only rounding 
 _DENSE_OFFSETS = np.linspace(-1, 1, 301) ** 5
 """Offsets of additional values from a meeting of roots, in widths of the range."""
 _END_RATIO = 1.25  # end of the range relative to the last event
+_FEWER_OFFSETS = 3  # every third of them is used for many eigenvalues
 _FAR_RATIO = 3  # farthest meeting of roots that is shown, relative to the design or the last axis crossing
 
 
@@ -57,7 +58,8 @@ class Growth(Tabular):
             problem file.
         modes: the same roots as named modes; a mode ends where roots meet.
         events: exact values at which roots cross the axis or meet. If the coefficients are not polynomials in `over`,
-            only changes of stability are listed.
+            only changes of stability are listed. For complex or large matrices, a grid shows the events
+            (`tmsopt.speeds`).
         rate: the unit of rates in 1/s, for each value; None without a unit of time.
         multiple: multiple roots of the design. Double precision gives them to half of its digits at most.
         petermann: Petermann factor of each root (`tmsopt.roots.find_conditioning`), in the shape of `roots`; None if
@@ -150,7 +152,7 @@ def growth(
     if not (end is None or (is_number(end) and end != 0)):
         raise input_error(f"found {short(end)}; accepted: a number other than 0", "end")
     parameter_set, parameters, name = _find_parameter(design, over)
-    model, form = design.problem.model, real_form(design.problem.posed)
+    model = design.problem.model
     has_critical = f"{name}_c" in model.quantity_names(parameter_set)
     design_value = parameters[name]
     critical = float(Values(model, parameter_set, parameters)[f"{name}_c"]) if has_critical else math.nan
@@ -159,35 +161,40 @@ def growth(
 
     def coefficients(x: Array) -> Array:
         """Coefficients at values x of the parameter, shape (n, degree + 1)."""
-        a = form.problem.model.coefficients({**parameters, name: x}, parameter_set)
+        a = model.coefficients({**parameters, name: x}, parameter_set)
         return np.stack(np.broadcast_arrays(*a, x)[:-1], axis=-1).astype(float)
 
-    is_open, is_polynomial = is_speed and end is None, True
+    is_open, is_polynomial = is_speed and end is None and model.polynomial is not None, True
+    count = _GRID_POINTS if model.polynomial is not None else choose_grid_size(model.degree)
     try:
-        a = coefficients_over(form.problem, parameter_set, parameters, name)
-        crossings = find_crossings(a, low, math.inf if is_open else high)
+        if model.polynomial is not None:
+            a = coefficients_over(design.problem.posed, parameter_set, parameters, name)
+            crossings = find_crossings(a, low, math.inf if is_open else high)
+        else:
+            crossings = find_eigenvalue_crossings(design.problem.posed.nominal, parameters, name, low, high)
     except InputError:
         is_open = is_polynomial = False
         crossings = Crossings(
             tuple(_find_stability_changes(coefficients, np.linspace(low, high, _GRID_POINTS))), (), ()
         )
-    crossings = user_crossings(form, crossings)
     if is_open:
         high = _choose_end(crossings.found, design_value)
     events = tuple(c for c in crossings.found if low < c.at < high)
     centres = [design_value, *(c.at for c in events if "EP" in c.kind)]
-    grid_start = low + (high - low) / _GRID_POINTS if is_speed else low  # at speed 0, roots are 0
-    grid = np.unique(
-        np.concatenate(
-            [np.linspace(grid_start, high, _GRID_POINTS), *(c + _DENSE_OFFSETS * (high - low) for c in centres)]
-        )
-    )
+    offsets = _DENSE_OFFSETS[:: 1 if count == _GRID_POINTS else _FEWER_OFFSETS] * (high - low)
+    grid_start = low + (high - low) / count if is_speed else low  # at speed 0, roots are 0
+    grid = np.unique(np.concatenate([np.linspace(grid_start, high, count), *(c + offsets for c in centres)]))
     values = grid[(grid > low if is_speed else grid >= low) & (grid <= high)]
 
-    c = coefficients(values)
-    is_finite = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # leave out poles and roots at infinity
-    values, c = values[is_finite], c[is_finite]
-    root_values = roots(c)
+    if model.polynomial is not None:
+        c = coefficients(values)
+        is_finite = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # leave out poles and roots at infinity
+        values, c = values[is_finite], c[is_finite]
+        root_values = roots(c)
+    else:
+        root_values = np.sort(find_eigenvalues(model, parameter_set, {**parameters, name: values}).eigenvalues)
+        is_finite = np.isfinite(root_values).all(axis=1)
+        values, root_values = values[is_finite], root_values[is_finite]
     if is_polynomial:
         stable, heavily_damped = (
             _clip_bands(bands, low, high) for bands in (crossings.stable, crossings.heavily_damped)
@@ -211,13 +218,10 @@ def growth(
         multiple_meetings,
         is_bicycle=is_bicycle(model) and model.degree == _BICYCLE_DEGREE,
         over_speed=is_speed,
+        is_complex=model.is_complex,
     )
-    if form.carrier is not None:
-        order = np.argsort(np.where(root_values.imag < 0, 0, 1), axis=-1, kind="stable")[..., : model.degree]
-        root_values = np.take_along_axis(root_values, order, axis=-1) + 1j * form.carrier
-        modes = tuple(
-            replace(m, name=m.name.replace("pair", "mode"), roots=m.roots.conj() + 1j * form.carrier) for m in modes
-        )
+    if model.is_complex:
+        modes = tuple(replace(m, name=m.name.replace("pair", "mode")) for m in modes)
     return Growth(
         parameter_set[name],
         values,

@@ -41,6 +41,7 @@ def follow_modes(
     *,
     is_bicycle: bool,
     over_speed: bool,
+    is_complex: bool = False,
 ) -> tuple[Mode, ...]:
     """Every root between meetings, with the name of its mode.
 
@@ -57,8 +58,9 @@ def follow_modes(
         multiple_meetings: values where more than two roots meet.
         is_bicycle: whether modes have the names of a bicycle.
         over_speed: whether the parameter is the speed.
+        is_complex: whether every root is a mode of its own, as for complex matrices.
     """
-    pieces = _split_pieces(values, roots, multiple_meetings)
+    pieces = _split_pieces(values, roots, multiple_meetings, is_complex)
     if not pieces:
         return ()
     typical_pieces = [
@@ -85,16 +87,17 @@ def follow_modes(
     )
 
 
-def _split_pieces(values: Array, roots: Complex, multiple_meetings: Sequence[float]) -> list[_Piece]:
-    real_counts = np.count_nonzero(roots.imag == 0, axis=1)
+def _split_pieces(values: Array, roots: Complex, multiple_meetings: Sequence[float], is_complex: bool) -> list[_Piece]:
+    is_real, is_upper = (roots.imag == 0) & (not is_complex), (roots.imag > 0) | is_complex
+    real_counts = np.count_nonzero(is_real, axis=1)
     cuts = np.union1d(np.flatnonzero(np.diff(real_counts)) + 1, np.searchsorted(values, multiple_meetings))
     pieces = []
     for rows in np.split(np.arange(len(values)), cuts):
         if len(rows) < _MIN_POINTS or np.ptp(values[rows]) < _MIN_SHARE * np.ptp(values):
             continue
         piece_roots, count = roots[rows], int(real_counts[rows[0]])
-        reals = np.sort(piece_roots.real[piece_roots.imag == 0].reshape(len(rows), count), axis=1)
-        pairs = np.sort_complex(piece_roots[piece_roots.imag > 0].reshape(len(rows), -1))
+        reals = np.sort(piece_roots.real[is_real[rows]].reshape(len(rows), count), axis=1)
+        pairs = np.sort_complex(piece_roots[is_upper[rows]].reshape(len(rows), -1))
         for k in range(1, len(rows)) if pairs.shape[1] > 1 else ():
             predicted = 2 * pairs[k - 1] - pairs[k - 2] if k > 1 else pairs[k - 1]
             pairs[k] = pairs[k][_match_roots(predicted, pairs[k])]

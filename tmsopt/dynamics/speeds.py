@@ -1,6 +1,7 @@
 """Finds all critical speeds of a bicycle: weave speeds, capsize speeds, and speeds at which roots meet."""
 
 import math
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,12 +13,12 @@ from tmsopt.algebra.balls import rational
 from tmsopt.algebra.formula import fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS
 from tmsopt.boundaries.weighted_design import parameter_faults
-from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, find_crossings, user_crossings
+from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, find_crossings
+from tmsopt.dynamics.eigenvalue_crossings import find_eigenvalue_crossings
 from tmsopt.errors import InputError, input_error, short, suggest
 from tmsopt.models import ParameterSet
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed, Problem
-from tmsopt.problem.real_form import real_form
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Table, Tabular, plain
@@ -61,6 +62,11 @@ class Speeds(Tabular):
     zeros: int = 0
 
     @property
+    def is_exact(self) -> bool:
+        """Whether every event is found, by exact root isolation; else eigenvalues on a grid show the events."""
+        return self.problem.model.polynomial is not None
+
+    @property
     def weave(self) -> tuple[float, ...]:
         """Speeds with a pair of roots on the imaginary axis."""
         return tuple(c.at for c in self.found if c.kind == "weave")
@@ -93,7 +99,7 @@ class Speeds(Tabular):
             "found": [plain(row) for row in self.records()],
             **plain(self, "stable heavily_damped"),
             "marginally_stable": plain(self, "marginal")["marginal"],
-            **plain(self, "always zeros parameters"),
+            **plain(self, "always zeros is_exact parameters"),
         }
 
 
@@ -108,11 +114,12 @@ def speeds(
     """Every weave and capsize speed of a design, and every speed at which roots meet, by exact root isolation.
 
     The coefficients are polynomials in the speed. The critical speeds are also roots of polynomials, so none is missed.
+    Eigenvalues of complex or large matrices are computed on a grid instead, and nothing is proved between its values.
 
     Args:
         design: a solution, a problem or its file, or the parameters of a design of `problem`. A problem with further
             free parameters is solved first.
-        parameter: the parameter that varies, by default the speed; the coefficients must be polynomials in it.
+        parameter: the parameter that varies, by default the speed; polynomial coefficients must be polynomials in it.
         between: the range of the parameter; by default the range in the problem if the parameter is free, otherwise its
             whole physical range.
         progress: called with a `tmsopt.Progress` now and then.
@@ -142,19 +149,20 @@ def speeds(
         raise input_error(f"unknown parameter '{name}'; {suggest(name, parameter_set.names)}", "parameter")
     parameters = parameters_of(design, posed, name, progress)
     start_steps(progress, "isolating speeds")
-    physical_range = parameter_set[name].range
+    physical_range, is_exact = parameter_set[name].range, nominal.model.polynomial is not None
     try:
         lower, upper = map(
             float, nominal.free.get(name, (physical_range.lower, physical_range.upper)) if between is None else between
         )
-        if not -math.inf < lower < upper:
+        if not -math.inf < lower < upper <= (math.inf if is_exact else sys.float_info.max):
             raise ValueError
     except (TypeError, ValueError):
         message = f"found {short(between)}; accepted: a smaller and a larger number, `--between LOW,HIGH`"
         raise input_error(message, "between") from None
-    form = real_form(nominal)
-    coefficients = coefficients_over(form.problem, parameter_set, parameters, name)
-    crossings = user_crossings(form, find_crossings(coefficients, lower, upper))
+    if is_exact:
+        crossings = find_crossings(coefficients_over(nominal, parameter_set, parameters, name), lower, upper)
+    else:
+        crossings = find_eigenvalue_crossings(nominal, parameters, name, lower, upper)
     return Speeds(nominal.problem, name, Table(parameters), lower, upper, **vars(crossings))
 
 

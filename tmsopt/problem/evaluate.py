@@ -109,7 +109,9 @@ def evaluate_matrices(model: Model, parameter_set: ParameterSet, columns: AnyNum
     """
     entries, matrix_shape = _matrix_formula(model, parameter_set.name)
     shape = np.broadcast_shapes(*map(np.shape, columns.values()))
-    parts = np.stack([np.broadcast_to(x, shape) for x in evaluate_on_arrays(entries, columns)], axis=-1)
+    parts = np.empty((*shape, len(entries.outputs)))
+    for k, x in enumerate(evaluate_on_arrays(entries, columns)):
+        parts[..., k] = x
     numbers = parts[..., ::2] + 1j * parts[..., 1::2] if model.is_complex else parts[..., ::2]
     return numbers.reshape(*shape, *matrix_shape)
 
