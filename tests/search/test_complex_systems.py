@@ -267,7 +267,7 @@ def test_a_threshold_of_a_lossier_mode_is_not_the_edge():
     gain = found.parameters["g"] - 0.1
     assert gain > 0.01
     assert found.beyond_axis == pytest.approx(gain, abs=EXACT)
-    assert found.notes == (f"not the edge of stability: another eigenfrequency has gain {gain:.2g}",)
+    assert found.notes == (f"not the edge of stability: another root has real part {gain:.2g}",)
     report = found.report()
     assert "one eigenfrequency has the most gain" in report
     assert "least damped" not in report
