@@ -30,7 +30,7 @@ def expand(matrices: Any, s: Any, count: int) -> list[Any]:
     """
     d = len(matrices) - 1
     terms = (
-        [comb(d - k, j) * s ** (d - k - j) * matrices[k] for k in range(d - j + 1)] for j in range(min(d + 1, count))
+        [matrices[k] * (comb(d - k, j) * s ** (d - k - j)) for k in range(d - j + 1)] for j in range(min(d + 1, count))
     )
     return [reduce(add, parts) for parts in terms]
 

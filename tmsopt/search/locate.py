@@ -14,18 +14,22 @@ from tmsopt.chains import (
     find_point,
     measure_point,
     nearest_crossing,
+    refine_near,
     targets_of,
 )
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem import Posed, Starts, degrees_of_freedom
+from tmsopt.problem.quantities import ROOT_NAMES
 from tmsopt.problem.real_form import has_real_form
 from tmsopt.problem.solution import OtherBranch
 from tmsopt.program import Options
+from tmsopt.program.chains import formulate_chains
 from tmsopt.program.formulate import default_start
+from tmsopt.program.ipopt import make_ipopt, make_polisher
 from tmsopt.program.starts import sample_box
 from tmsopt.progress import begin
 from tmsopt.records import Array, Table
-from tmsopt.search.outcome import Outcome, assess_design
+from tmsopt.search.outcome import Outcome, assess_design, find_active_limits
 
 REACH_OF_CROSSING = 0.02
 """Greatest distance, as a share of the box, from where a start ends to a point at which eigenvectors do not meet."""
@@ -34,6 +38,8 @@ _MIN_STARTS = 12  # starts that look for other solutions
 _SAME_POINT = 1e-7  # relative to each range: points that differ less are one solution
 _ROUNDINGS = 8  # units in the last place by which a parameter may change to become a short decimal
 _ZERO = 2.0**-52
+_MAX_OPTIMISED = 8  # points from which the objective is optimised
+_STATIONARY = 1e-7  # largest gradient of the Lagrangian, and largest violation of a row, of an optimum
 _MAX_OVERSHOOT = 1e-9  # relative to a range: a point this far outside it still counts as inside
 
 
@@ -52,21 +58,16 @@ class _Found:
 
 
 def has_chains(problem: Posed) -> bool:
-    """Whether a problem asks for a pattern of a system of the user's matrices, and for nothing else but limits."""
+    """Whether a problem asks for a pattern of a system of the user's matrices, and for no other quantity of its roots."""
     is_stated = problem.model.statement is not None and problem.model.pencil is not None
-    equalities = any(condition.equality for condition in problem.conditions.values())
-    return bool(
-        is_stated and problem.locate and problem.free and not (problem.objective or problem.cases or equalities)
-    )
+    asks_roots = any(problem.asks(name) for name in ROOT_NAMES) if is_stated else True
+    return bool(is_stated and problem.locate and problem.free and not (problem.cases or asks_roots))
 
 
 def locate_by_chains(
     problem: Posed, options: Options, extra_starts: Sequence[Mapping[str, float]] = ()
 ) -> Outcome | None:
-    """The solution nearest to the start that meets all limits; None if none is found.
-
-    If the conditions leave freedom and a limit is active at the nearest solution, the result is None, too.
-    """
+    """The best solution, or without an objective the one nearest to the start; None if none is found."""
     assert problem.pattern is not None
     family, targets = family_of(problem), targets_of(problem.pattern.name, problem.model.is_complex)
     first, rng = (
@@ -92,6 +93,10 @@ def locate_by_chains(
             start_count >= min(_MIN_STARTS, options.starts) and any(not f.violated for f in found)
         ):
             break
+    equalities = any(condition.equality for condition in problem.conditions.values())
+    has_freedom = degrees_of_freedom(problem).count > 0
+    if found and (problem.objective or equalities or (has_freedom and all(f.violated for f in found))):
+        return _optimise(problem, family, targets, found, options, start_count)
     feasible = sorted(
         (f for f in found if not f.violated), key=lambda f: float(np.linalg.norm((f.point.p - first) / family.widths))
     )
@@ -115,6 +120,49 @@ def locate_by_chains(
         if is_square
         else (),
     )
+
+
+def _optimise(
+    problem: Posed,
+    family: Family,
+    targets: Sequence[Target],
+    found: Sequence[_Found],
+    options: Options,
+    start_count: int,
+) -> Outcome | None:
+    """The best end of IPOPT from points with the pattern; None if none is an optimum and the factors can follow."""
+    outcomes = list[Outcome]()
+    for known in sorted(found, key=lambda f: len(f.violated))[:_MAX_OPTIMISED]:
+        nlp, x = formulate_chains(problem, targets, known.point)
+        point = make_polisher(nlp)(make_ipopt(nlp, options, "near")(x), nlp)
+        p = np.clip(point.x[: len(problem.free)], *family.box.T)
+        exact = refine_near(family, targets, p)
+        if exact is not None and np.all(np.abs(exact.p - p) <= _SAME_POINT * family.widths):
+            p = np.clip(exact.p, *family.box.T)
+        parameters = problem.ordered(dict(zip(problem.free, p.tolist(), strict=True)))
+        checked = recheck(problem, parameters)
+        is_optimal = not checked.violations and max(point.stationarity, point.violation) <= _STATIONARY
+        starts = Starts(start_count, len(found), 1, runs=start_count)
+        gains = find_active_limits(problem, nlp, point)
+        outcomes.append(
+            Outcome(parameters, checked, "optimal" if is_optimal else "not_converged", gains, starts, "chains")
+        )
+    best = min(
+        outcomes, key=lambda o: (o.status != "optimal", sum(o.checked.violations.values()), _rank_objective(problem, o))
+    )
+    agreeing = [o for o in outcomes if o.status == "optimal" and _is_same_objective(problem, o, best)]
+    best = replace(best, starts=replace(best.starts, at_best=len(agreeing)))
+    return best if best.status == "optimal" or not has_real_form(problem.model) else None
+
+
+def _rank_objective(problem: Posed, outcome: Outcome) -> float:
+    value = problem.sign * outcome.checked.objective
+    return value if np.isfinite(value) else 0.0
+
+
+def _is_same_objective(problem: Posed, outcome: Outcome, best: Outcome) -> bool:
+    a, b = (_rank_objective(problem, o) for o in (outcome, best))
+    return abs(a - b) <= _SAME_POINT * max(1.0, abs(b))
 
 
 def _fail(problem: Posed, p: Array, start_count: int) -> Outcome | None:

@@ -44,7 +44,7 @@ class Outcome:
 
     Attributes:
         checked: the result of the recheck.
-        active_gains: active limit → how much the objective improves per unit of relaxation; see `_find_active_limits`.
+        active_gains: active limit → how much the objective improves per unit of relaxation; see `find_active_limits`.
         cases: the cases in which the design was checked.
         has_no_best_design: whether no design is the best, because designs improve without end.
     """
@@ -92,7 +92,7 @@ def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None
     if freedom.kind == "square":
         equations = formulate_matching(problem) if problem.pattern else formulate_by_factors(problem)
         branches = _find_other_branches(problem, nlp if not nlp.kinks else equations, parameters)
-    active_gains = _find_active_limits(problem, nlp, trial.point)
+    active_gains = find_active_limits(problem, nlp, trial.point)
     checked_cases = tuple(nlp.cases if cases is None else cases)
     return Outcome(parameters, checked, status, active_gains, starts, nlp.formulation, checked_cases, branches, notes)
 
@@ -184,7 +184,7 @@ def is_unclear(problem: Posed, checked: Evaluation) -> bool:
     return bool(abs(checked.structure.abscissa - checked.abscissa_realised) > scatter)
 
 
-def _find_active_limits(problem: Posed, nlp: NLP, point: Point) -> dict[str, float]:
+def find_active_limits(problem: Posed, nlp: NLP, point: Point) -> dict[str, float]:
     """Return for each active constraint or bound how much the objective improves per unit of relaxation.
 
     For an equality constraint, return the change of the objective per unit added to its right-hand side. A constraint
