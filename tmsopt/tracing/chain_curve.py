@@ -130,15 +130,10 @@ class ChainSetup:
         for j, k in combinations(same, 2):
             if self.targets[j].axis == self.targets[k].axis:
                 merged = replace(self.targets[j], order=self.targets[j].order + self.targets[k].order)
-                others = [t for i, t in enumerate(self.targets) if i not in (j, k)]
-                places = iter(range(1, len(others) + 1))
-                variants.append(
-                    (
-                        np.abs(roots[:, j] - roots[:, k]) / self.unit,
-                        [merged, *others],
-                        [0 if i in (j, k) else next(places) for i in same],
-                    )
-                )
+                others = [i for i in same if i not in (j, k)]
+                places = [others.index(i) + 1 if i in others else 0 for i in same]
+                distances = np.abs(roots[:, j] - roots[:, k]) / self.unit
+                variants.append((distances, [merged, *(self.targets[i] for i in others)], places))
         for heights, targets, places in variants:
             for row in _find_minima(heights):
                 starts = [complex(roots[row, places.index(i)]) for i in range(len(targets))]

@@ -217,8 +217,8 @@ def compute_tangent(curve: Curve, y: Array) -> Array:
         balanced = balanced / np.where(norm > 0, norm, 1.0)
     singular = np.linalg.svd(balanced, compute_uv=False)
     size = jacobian.shape[1]
-    _, (largest, *_, smallest), V = np.linalg.svd(jacobian)
-    is_isolated = len(jacobian) >= size and smallest > _MIN_SINGULAR_VALUE * largest
+    _, values, V = np.linalg.svd(jacobian)
+    is_isolated = len(values) == size and values[-1] > _MIN_SINGULAR_VALUE * values[0]
     if is_isolated or singular[size - 2] <= _MIN_SINGULAR_VALUE * singular[0]:
         raise ValueError("the equations do not determine a direction here")
     return np.asarray(V[-1])

@@ -17,7 +17,7 @@ from tmsopt.records import Array
 from tmsopt.roots import Pattern, pattern as pattern_of
 from tmsopt.tracing.branch import Branch, EventPoint, table_at
 from tmsopt.tracing.chain_curve import ChainSetup
-from tmsopt.tracing.continuation import CLOSED, SINGULAR, End, Walk
+from tmsopt.tracing.continuation import CLOSED, SINGULAR, End, Walk, step_along
 from tmsopt.tracing.equations import Setup, TracingSetup, prepare_factors
 from tmsopt.tracing.events import SAME_PLACE, Event, LocatedEvent, insert_events, locate_events, refine_walk
 from tmsopt.tracing.points import Points, roots_along
@@ -194,7 +194,7 @@ def _add_special_points(setup: Setup, walk: Walk, located_events: list[LocatedEv
         details = {"crossing": CROSSING}
         return [
             *(
-                _place_event(Event(n, lambda p: p.residual, detail=details.get(n, "")), walk, y)
+                _place_event(setup, Event(n, lambda p: p.residual, detail=details.get(n, "")), walk, y)
                 for n, y in setup.special_points(walk.y)
             ),
             *located_events,
@@ -231,14 +231,15 @@ def _solve_EP4(setup: TracingSetup, walk: Walk, located_event: LocatedEvent) -> 
     exact_point[setup.unknown_columns] = (
         _convert_unknowns(EP4_problem.pattern, (solution * unit)[free_count:], pattern) / scale[setup.unknown_columns]
     )
-    return _place_event(_EP4, walk, exact_point)
+    return replace(_place_event(setup, _EP4, walk, exact_point), t=located_event.t)
 
 
-def _place_event(event: Event, walk: Walk, y: Array) -> LocatedEvent:
+def _place_event(setup: Setup, event: Event, walk: Walk, y: Array) -> LocatedEvent:
     """An event at a point next to a walk."""
     k = int(np.argmin(np.abs(walk.y - y).max(axis=1)))
     row = k if walk.t[k] @ (y - walk.y[k]) >= 0 else max(k - 1, 0)
-    return LocatedEvent(event, y, walk.t[k], row, float(walk.t[row] @ (y - walk.y[row])))
+    (t,) = step_along(setup.curve, y[None], walk.t[[k]], np.zeros(1))[1]
+    return LocatedEvent(event, y, t if np.isfinite(t).all() else walk.t[k], row, float(walk.t[row] @ (y - walk.y[row])))
 
 
 def _convert_unknowns(pattern: Pattern, unknowns: Array, target: Pattern) -> Array:

@@ -27,7 +27,9 @@ SAME_PLACE = 1e-6
 STABILITY_CHANGES = "stability changes"
 """Detail of weave and capsize events, which are listed only where stability changes."""
 
-_PACKAGE_NAMES = r"weave|capsize|fold|constraint|end|resonance|crossing|(double|\d+-fold) zero|\d*C?EP\d\S*"  # names of events of the package
+_PACKAGE_NAMES = r"weave|capsize|fold|constraint|end|resonance|crossing|(double|\d+-fold) zero|\d*C?EP\d\S*"
+"""Names of the events of the package."""
+
 _MIN_DIP = 0.5
 """A minimum between two steps is searched if a parabola predicts a fall by at least this share of the value."""
 _MAX_DEVIATION = 2.0  # largest distance of a zero from its row, in arclengths; a zero farther away is on another curve

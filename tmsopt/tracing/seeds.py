@@ -162,8 +162,7 @@ def _project_designs(
     if isinstance(setup, ChainSetup):
         rng = np.random.default_rng(0)  # every second design chooses freely which eigenvalues shall meet
         found = [setup.find_point(design, rng if k % 2 else None) for k, design in enumerate(designs)]
-        inside = [y is not None and np.all((y >= curve.lower - 1e-12) & (y <= curve.upper + 1e-12)) for y in found]
-        return [[np.clip(y, curve.lower, curve.upper)] if y is not None and i else [] for y, i in zip(found, inside)]
+        return [[y] if y is not None and np.all((curve.lower <= y) & (y <= curve.upper)) else [] for y in found]
     starts = [
         (k, y)
         for k, design in enumerate(designs)
