@@ -8,6 +8,7 @@ so that conditions that a symmetry fulfils for all parameters do no harm.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -135,12 +136,17 @@ class ExceptionalPoint:
 
 
 def find_point(
-    family: Family, targets: Sequence[Target], start: Array, rng: np.random.Generator | None = None
+    family: Family,
+    targets: Sequence[Target],
+    start: Array,
+    rng: np.random.Generator | None = None,
+    is_nearest: bool = True,
 ) -> ExceptionalPoint | None:
     """The point that the two stages reach from a design; None if they fail.
 
     Args:
         rng: chooses which eigenvalues shall coincide; by default those that are nearest each other.
+        is_nearest: if the conditions leave freedom, find the nearest point, which takes more steps.
     """
     with np.errstate(all="ignore"):
         try:
@@ -150,7 +156,7 @@ def find_point(
         if state is None:
             return None
         try:
-            point = refine(family, targets, state.p, state.means, start, state.steps)
+            point = refine(family, targets, state.p, state.means, start if is_nearest else None, state.steps)
             return point if point.is_found else replace(point, p=state.p)
         except np.linalg.LinAlgError:  # an eigenvalue has several eigenvectors there
             unknown = np.full(len(state.p), np.inf)
@@ -173,7 +179,7 @@ def gather_roots(family: Family, targets: Sequence[Target]) -> tuple[complex, ..
     except np.linalg.LinAlgError:
         return None
     means = [complex(group.mean()) for group in groups if group is not None]
-    return tuple(map(_project, means, targets)) if len(means) == len(targets) else None
+    return tuple(map(project_on_axis, means, targets)) if len(means) == len(targets) else None
 
 
 @dataclass(frozen=True)
@@ -330,11 +336,11 @@ def refine(
     Raises:
         LinAlgError: if the matrices are not finite, or an eigenvalue has several eigenvectors.
     """
-    roots = [_project(s, target) for s, target in zip(roots, targets, strict=True)]
+    roots = [project_on_axis(s, target) for s, target in zip(roots, targets, strict=True)]
     borders = [find_borders(family.matrices(p), s)[0] for s in roots]
     best, stalled_steps, step_count = None, 0, 0
     while step_count < _MAX_CHAIN_STEPS and stalled_steps < _STALLED_STEPS:
-        equations = _chain_equations(family, targets, p, roots, borders)
+        equations = chain_equations(family, targets, p, roots, borders)
         has_stalled = best is not None and not equations.error < max(_PROGRESS * best.error, _STILL)
         stalled_steps = stalled_steps + 1 if has_stalled else 0
         if best is None or equations.error <= max(best.error, _STILL):
@@ -362,7 +368,7 @@ def measure_point(family: Family, targets: Sequence[Target], p: Array) -> Except
 
 
 @dataclass(frozen=True)
-class _ChainEquations:
+class ChainEquations:
     """The equations of the chains at a design: residuals, slopes with respect to parameters and eigenvalues."""
 
     p: Array
@@ -370,21 +376,34 @@ class _ChainEquations:
     residual: Array
     slopes: Array
     root_slopes: Array
-    error: float
+    sizes: tuple[float, ...]
+
+    @cached_property
+    def error(self) -> float:
+        """Largest relative change of the matrices that makes a chain exact."""
+        return max(chain.backward_error(size) for chain, size in zip(self.chains, self.sizes, strict=True))
 
 
-def _chain_equations(
+def chain_equations(
     family: Family,
     targets: Sequence[Target],
     p: Array,
     roots: Sequence[complex],
     borders: Sequence[tuple[Complex, Complex]],
-) -> _ChainEquations:
+) -> ChainEquations:
+    """The equations of the chains of several targets.
+
+    Args:
+        borders: borders of the matrix polynomial at each root, see `tmsopt.roots.chains.find_borders`.
+
+    Raises:
+        LinAlgError: if the matrices are not finite, or an eigenvalue has several eigenvectors.
+    """
     matrices, slopes = family.expand(p)
     chains = tuple(make_chain(matrices, s, t.order, b) for s, t, b in zip(roots, targets, borders, strict=True))
-    residual, rows, root_rows, errors = list[Array](), list[Array](), list[Array](), list[float]()
-    for chain, target in zip(chains, targets, strict=True):
-        size = size_at(matrices, chain.s)
+    residual, rows, root_rows = list[Array](), list[Array](), list[Array]()
+    sizes = tuple(size_at(matrices, s) for s in roots)
+    for chain, target, size in zip(chains, targets, sizes, strict=True):
         columns = [chain.residuals, *(chain.respond(change) for change in slopes)]
         columns += [chain.slopes * direction for direction in target.directions]
         table = np.array(columns).T / size
@@ -392,17 +411,16 @@ def _chain_equations(
         residual.append(parts[:, 0])
         rows.append(parts[:, 1 : 1 + len(p)])
         root_rows.append(parts[:, 1 + len(p) :])
-        errors.append(chain.backward_error(size))
     width = sum(part.shape[1] for part in root_rows)
     root_slopes, row, column = np.zeros((sum(map(len, residual)), width)), 0, 0
     for part in root_rows:
         root_slopes[row : row + len(part), column : column + part.shape[1]] = part
         row, column = row + len(part), column + part.shape[1]
-    return _ChainEquations(p, chains, np.concatenate(residual), np.concatenate(rows), root_slopes, max(errors))
+    return ChainEquations(p, chains, np.concatenate(residual), np.concatenate(rows), root_slopes, sizes)
 
 
 def _chain_step(
-    equations: _ChainEquations, targets: Sequence[Target], family: Family, pull: Array
+    equations: ChainEquations, targets: Sequence[Target], family: Family, pull: Array
 ) -> tuple[Array, list[complex]]:
     """The step of the parameters in shares of their ranges, and the moves of the eigenvalues.
 
@@ -425,7 +443,7 @@ def _rank(values: Any) -> int:
     return int(np.sum(values > _CUTOFF * max(values[0], 1e-300))) if values.size else 0
 
 
-def _measure_sensitivity(equations: _ChainEquations, widths: Array) -> Array:
+def _measure_sensitivity(equations: ChainEquations, widths: Array) -> Array:
     basis = np.linalg.qr(equations.root_slopes, mode="complete")[0][:, equations.root_slopes.shape[1] :]
     reduced = basis.T @ equations.slopes * widths
     if not np.isfinite(reduced).all() or _rank(np.linalg.svd(reduced, compute_uv=False)) < len(widths):
@@ -433,6 +451,6 @@ def _measure_sensitivity(equations: _ChainEquations, widths: Array) -> Array:
     return np.asarray(widths * np.abs(np.linalg.pinv(reduced)).sum(axis=1))
 
 
-def _project(s: complex, target: Target) -> complex:
+def project_on_axis(s: complex, target: Target) -> complex:
     """The point of the axis of a target that is nearest to s."""
     return {"real": complex(s.real), "imaginary": 1j * s.imag, "zero": 0j}.get(target.axis, s)

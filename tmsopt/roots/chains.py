@@ -62,7 +62,12 @@ class Chain:
         """The unit u of t in which the first and the last vector of the chain, x₀ and x_j u^j, have the same length."""
         first, *_, last = np.linalg.norm(self.right[[0, 0, -1]], axis=1)
         growth = last / first
-        return float(growth ** (-1 / (self.order - 1))) if self.order > 1 and 0 < growth < np.inf else 1.0
+        unit = float(growth ** (-1 / (self.order - 1))) if self.order > 1 and 0 < growth < np.inf else 1.0
+        if len(value := self.terms[0]) == 1 or len(self.terms) < 3:
+            return unit
+        # the last vector may vanish, as in an uncoupled oscillator
+        ratio = float(np.linalg.norm(value) / np.linalg.norm(self.terms[-1]))
+        return min(unit, ratio ** (1 / (len(self.terms) - 1))) or unit
 
     @property
     def powers(self) -> Array:

@@ -7,7 +7,8 @@ function of scalar operations holds the predictor, three corrections and the new
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any, NamedTuple
@@ -51,7 +52,7 @@ class Curve:
     scale: Array
     lower: Array
     upper: Array
-    evaluate: ca.Function = field(repr=False)
+    evaluate: Any = field(repr=False)
     advance: Any = field(repr=False)
 
 
@@ -155,6 +156,55 @@ def compile_curve(x: Any, equations: Any, scale: Array, lower: Array, upper: Arr
     return Curve(scale, low, high, scaled_system, ca.Function("advance", [y, t, s, origin], [z, tangent, checks]))
 
 
+def make_curve(
+    evaluate: Callable[[Array], tuple[Array, Array]], count: int, scale: Array, lower: Array, upper: Array
+) -> Curve:
+    """The curve F(y) = 0 for a function of one point y that gives F and its Jacobian.
+
+    There may be more equations than n if some follow from the others. `lower` and `upper` are limits of y. Where the
+    function raises a LinAlgError, results are nan.
+
+    Args:
+        count: number of equations.
+    """
+    size, room = len(scale), np.where(np.isfinite(lower) & np.isfinite(upper), 1.0, np.inf)
+
+    def evaluate_all(y: Array) -> list[Array]:
+        values, jacobians = np.full((len(y), count), np.nan), np.full((len(y), size, count), np.nan)
+        for k, point in enumerate(y):
+            with suppress(np.linalg.LinAlgError):
+                values[k], jacobian = evaluate(point)
+                jacobians[k] = jacobian.T
+        return [values, jacobians]
+
+    def step(y: Array, t: Array, s: float, origin: Array) -> tuple[Array, Array, list[float]]:
+        z, sizes = y + s * t, list[float]()
+        for _ in range(3):
+            value, jacobian = evaluate(z)
+            sides = np.append(value, t @ (z - y) - s)
+            correction = np.linalg.lstsq(np.vstack([jacobian, t]), sides, rcond=None)[0]
+            z = z - correction
+            sizes.append(float(np.linalg.norm(correction) / (1 + np.abs(z).max())))
+        value, jacobian = evaluate(z)
+        sizes[-1] += float(np.linalg.norm(value) / np.linalg.norm(jacobian))  # dependent equations may contradict
+        tangent = np.linalg.lstsq(np.vstack([jacobian, t]), np.append(np.zeros(count), 1.0), rcond=None)[0]
+        tangent /= np.linalg.norm(tangent)
+        unbounded_room = _UNBOUNDED_RATIO * (1 + np.abs(z)) * np.sqrt(np.maximum(1, np.abs(z) / _REMOTE_SIZE))
+        step_factor = np.min(np.minimum(room, unbounded_room) / (np.abs(tangent) + 1e-300))
+        slack, offset = np.min([z - lower, upper - z]), origin - y
+        checks = [t @ tangent, step_factor, slack, np.abs(z).max(), np.linalg.norm(offset), t @ offset]
+        return z, tangent, [*sizes, *map(float, checks)]
+
+    def advance(y: Array, t: Array, s: Array, origin: Array) -> list[Array]:
+        columns = [np.full((len(y), width), np.nan) for width in (size, size, len(_StepChecks._fields))]
+        for k in range(len(y)):
+            with suppress(np.linalg.LinAlgError):
+                columns[0][k], columns[1][k], columns[2][k] = step(y[k], t[k], float(s[k, 0]), origin[k])
+        return columns
+
+    return Curve(scale, lower, upper, evaluate_all, advance)
+
+
 def compute_tangent(curve: Curve, y: Array) -> Array:
     """Unit tangent at a point of the curve.
 
@@ -166,9 +216,12 @@ def compute_tangent(curve: Curve, y: Array) -> Array:
         norm = np.linalg.norm(balanced, axis=axis, keepdims=True)
         balanced = balanced / np.where(norm > 0, norm, 1.0)
     singular = np.linalg.svd(balanced, compute_uv=False)
-    if singular[-1] <= _MIN_SINGULAR_VALUE * singular[0]:
+    size = jacobian.shape[1]
+    _, values, V = np.linalg.svd(jacobian)
+    is_isolated = len(values) == size and values[-1] > _MIN_SINGULAR_VALUE * values[0]
+    if is_isolated or singular[size - 2] <= _MIN_SINGULAR_VALUE * singular[0]:
         raise ValueError("the equations do not determine a direction here")
-    return np.asarray(np.linalg.svd(jacobian)[2][-1])
+    return np.asarray(V[-1])
 
 
 def follow(curve: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
@@ -181,7 +234,9 @@ def follow(curve: Curve, start: CurvePoint, step: float) -> Iterator[Any]:
         next_y, tangent, checks = step_from(y[None], t[None], np.array([[s]]), start.y[None])
         return next_y[0], tangent[0], _StepChecks(*checks[0].tolist())
 
-    y, t, count, step_from = start.y, start.t, 1, MappedFunction(curve.advance, 1)
+    y, t, count, step_from = start.y, start.t, 1, curve.advance
+    if isinstance(step_from, ca.Function):
+        step_from = MappedFunction(step_from, 1)
     s, (*_, checks) = step / 4, advance(y, t, 0.0)
     while True:
         s = min(s, step * checks.step_factor)

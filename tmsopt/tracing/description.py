@@ -11,16 +11,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from tmsopt.chains import family_of
 from tmsopt.chains.meetings import is_crossing
-from tmsopt.problem.problem import Posed
 from tmsopt.problem.verdict.stability import CROSSING
 from tmsopt.records import Array
 from tmsopt.roots import Pattern, pattern as pattern_of
-from tmsopt.roots.chains import eigenvalues_of
 from tmsopt.tracing.branch import Branch, EventPoint, table_at
-from tmsopt.tracing.continuation import CLOSED, SINGULAR, End, Walk
-from tmsopt.tracing.equations import TracingSetup, prepare_tracing
+from tmsopt.tracing.chain_curve import ChainSetup
+from tmsopt.tracing.continuation import CLOSED, SINGULAR, End, Walk, step_along
+from tmsopt.tracing.equations import Setup, TracingSetup, prepare_factors
 from tmsopt.tracing.events import SAME_PLACE, Event, LocatedEvent, insert_events, locate_events, refine_walk
 from tmsopt.tracing.points import Points, roots_along
 from tmsopt.tracing.solving import project_rows
@@ -33,7 +31,6 @@ _SAME_DESIGN = 1e-6
 _MAX_RESIDUAL = 1e-6  # largest mismatch of a coefficient at a point of a branch
 
 _SQUARE_TOLERANCE = 1e-9  # relative difference of c from b²/4 below which a quadratic factor has a double root
-_ROUNDING = 1e-13  # of an eigenvalue, as a share of their typical size
 
 _EP4 = Event("EP4", lambda points: points.residual)  # an EP4 is located by equations of its own
 
@@ -41,7 +38,7 @@ RowEvent = tuple[int, Event]
 """A row of a walk, and the event at this row."""
 
 
-def make_branches(setup: TracingSetup, walk: Walk, events: Sequence[Event] = ()) -> Iterator[Branch]:
+def make_branches(setup: Setup, walk: Walk, events: Sequence[Event] = ()) -> Iterator[Branch]:
     """Convert a walk to branches, with the events among their points. Events that stop the curve divide it."""
     walk, row_events = find_events(setup, _trim_inexact_ends(setup, walk), events)
     if walk.closed and (stops := [row for row, event in row_events if event.stop]):
@@ -59,28 +56,33 @@ def make_branches(setup: TracingSetup, walk: Walk, events: Sequence[Event] = ())
         )
 
 
-def find_events(setup: TracingSetup, walk: Walk, events: Sequence[Event]) -> tuple[Walk, list[RowEvent]]:
+def find_events(setup: Setup, walk: Walk, events: Sequence[Event]) -> tuple[Walk, list[RowEvent]]:
     """The walk with its events among its points, and the rows of the events."""
     walk = refine_walk(setup, walk, events)
-    groups = _group_events(_add_exact_EP4(setup, walk, [*locate_events(setup, walk, events)]), len(setup.problem.free))
+    groups = _group_events(
+        _add_special_points(setup, walk, [*locate_events(setup, walk, events)]), len(setup.problem.free)
+    )
     rows, walk = insert_events(walk, [group[0] for group in groups])
     return walk, [
         (row, event) for row, group in zip(rows, groups, strict=True) for event in _merge_events(group, events)
     ]
 
 
-def make_branch(setup: TracingSetup, walk: Walk, row_events: Sequence[RowEvent]) -> Branch:
+def make_branch(setup: Setup, walk: Walk, row_events: Sequence[RowEvent]) -> Branch:
     """A walk as a branch in the parameters of the problem."""
     problem, pattern, points = setup.problem, setup.pattern, Points(setup, walk.y, walk.t)
-    if pattern.unknowns[-2:] == ("b", "c"):  # rounding would move a double root of a factor by 1e-8
+    if isinstance(setup, TracingSetup) and pattern.unknowns[-2:] == (
+        "b",
+        "c",
+    ):  # rounding would move a double root of a factor by 1e-8
         b, c = (points.x[:, setup.unknown_columns.stop - k] for k in (2, 1))
         for row in {row for row, event in row_events if "EP" in event.name}:
             c[row] = b[row] ** 2 / 4 if abs(b[row] ** 2 / 4 - c[row]) <= _SQUARE_TOLERANCE * abs(c[row]) else c[row]
-    kinds = pattern.kind(points.unknowns)
+    kinds = pattern.kind([points.column(0.0), *points.unknowns][-len(pattern.unknowns) :])
     for name in points.special_cases:
         kinds[:] = name
     for row, event in row_events:
-        if event.name in pattern.marks or event.name == "EP4":
+        if event.name in pattern.marks or re.fullmatch(r"C?EP\d+", event.name):
             kinds[row] = event.name
     residual, columns = points.residual, points.parameters
     event_rows = [(row, event.name, event.detail) for row, event in row_events]
@@ -93,10 +95,12 @@ def make_branch(setup: TracingSetup, walk: Walk, row_events: Sequence[RowEvent])
         for row, name, detail in sorted(event_rows, key=lambda n: n[0])
     ]
     steps = np.diff(walk.y, axis=0)[:, : len(problem.free)]
+    unknowns = dict(zip(pattern.unknowns, points.unknowns, strict=True))
+    frequencies = {name: column for name, column in unknowns.items() if name.startswith("omega")}
     return Branch(
         pattern=str(problem.locate),
         parameters=columns,
-        unknowns=dict(zip(pattern.unknowns, points.unknowns, strict=True)),
+        unknowns=unknowns,
         tangent=_compute_natural_tangent(points),
         arclength=np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))]),
         kinds=kinds,
@@ -107,54 +111,8 @@ def make_branch(setup: TracingSetup, walk: Walk, row_events: Sequence[RowEvent])
         events=tuple(event_points),
         closed=walk.closed,
         residual=float(np.max(residual)),
-        eigenfrequency=_compute_eigenfrequency(points),
+        eigenfrequency=frequencies if problem.model.is_complex else None,
     )
-
-
-def restate_branch(problem: Posed, branch: Branch) -> Branch:
-    """A branch of the real problem that a symmetry leaves, as a branch of the complex problem.
-
-    Its unknown r is the distance of the multiple eigenfrequency from the mean.
-    """
-    family, count = family_of(problem), len(branch)
-    columns = problem.ordered({n: branch.parameters[n] for n in problem.free})
-    parameters = {n: np.array(np.broadcast_to(v, count), dtype=float) for n, v in columns.items()}
-    matrices = [family.matrices(p) for p in np.array([parameters[n] for n in problem.free]).T]
-    means = np.array([1j * eigenvalues_of(P).mean() for P in matrices])
-    omega = means + branch.unknowns["r"] if "r" in branch.unknowns else means
-    order = int(branch.pattern.removeprefix("EP")) if branch.pattern.startswith("EP") else 1
-    abscissa, zero = np.empty(count), _ROUNDING * family.typical_size
-    for k, P in enumerate(matrices):
-        s = eigenvalues_of(P)  # those that meet are known exactly
-        others = s[np.argsort(np.abs(s + 1j * omega[k]), kind="stable")[order:]]
-        abscissa[k] = max(x if abs(x) > zero else 0.0 for x in (omega[k].imag, *others.real))
-    events = [e for e in branch.events if "EP" in e.name or e.name in ("fold", "end", "constraint")]
-    return replace(
-        branch,
-        parameters=parameters,
-        abscissa=abscissa,
-        stable=abscissa < 0,
-        heavily_damped=np.zeros(count, dtype=bool),
-        events=tuple(replace(e, parameters=table_at(parameters, e.index)) for e in events),
-        eigenfrequency={
-            "omega_re": omega.real,
-            "omega_im": np.where(np.abs(omega.imag) > zero, omega.imag, 0.0),
-        },
-    )
-
-
-def _compute_eigenfrequency(points: Points) -> dict[str, Array] | None:
-    """The multiple eigenfrequency ω of a complex system; None for a real system.
-
-    The carrier is a real constant that is added to all eigenfrequencies, so ω is i s minus the carrier.
-    """
-    model, pattern = points.setup.problem.model, points.setup.pattern
-    if not model.is_complex:
-        return None
-    if not pattern.form.startswith("CEP") or pattern.unknowns[:2] != ("b", "c"):
-        return {}
-    b, c = points.unknowns[:2]
-    return {"omega_re": np.sqrt(c - b * b / 4) - model.carrier, "omega_im": -b / 2}
 
 
 def _group_events(located_events: Sequence[LocatedEvent], free_count: int) -> list[list[LocatedEvent]]:
@@ -205,7 +163,7 @@ def _compute_natural_tangent(points: Points) -> dict[str, Array]:
     return {n: dv / (1 + v**2) if parameter_set[n].tangent else dv for n, dv, v in columns}
 
 
-def _trim_inexact_ends(setup: TracingSetup, walk: Walk) -> Walk:
+def _trim_inexact_ends(setup: Setup, walk: Walk) -> Walk:
     """The walk without the points at its ends whose parameters do not fit the unknowns, as happens near infinity."""
     with np.errstate(all="ignore"):
         good_rows = np.flatnonzero(Points(setup, walk.y, walk.t).residual <= _MAX_RESIDUAL)
@@ -215,7 +173,7 @@ def _trim_inexact_ends(setup: TracingSetup, walk: Walk) -> Walk:
     return replace(walk, y=walk.y[kept_rows], t=walk.t[kept_rows])
 
 
-def describe_end(setup: TracingSetup, end: End) -> str:
+def describe_end(setup: Setup, end: End) -> str:
     """Why a curve ends, in words."""
     if end.variable is None:
         return end.reason if end.reason != CLOSED else ""
@@ -226,12 +184,21 @@ def describe_end(setup: TracingSetup, end: End) -> str:
     return setup.pattern.ends.get(name, "the other roots reach a limit of the search")
 
 
-def _add_exact_EP4(setup: TracingSetup, walk: Walk, located_events: list[LocatedEvent]) -> list[LocatedEvent]:
-    """The exact EP4s of a curve, and then all events.
+def _add_special_points(setup: Setup, walk: Walk, located_events: list[LocatedEvent]) -> list[LocatedEvent]:
+    """The special points of a curve of chains, or the exact EP4s of a curve of factors, and then all events.
 
     On a curve of EP2, the marks of EP3 and 2EP2 both vanish at an EP4. If the curve is symmetric about the EP4, the
     marks touch 0 without a change of sign, and so they give the EP4 only to 1e-6.
     """
+    if isinstance(setup, ChainSetup):
+        details = {"crossing": CROSSING}
+        return [
+            *(
+                _place_event(setup, Event(n, lambda p: p.residual, detail=details.get(n, "")), walk, y)
+                for n, y in setup.special_points(walk.y)
+            ),
+            *located_events,
+        ]
     candidates = [f for f in located_events if f.event.name == "EP4"]
     if setup.pattern.form == "EP2" and {"EP3", "2EP2"} <= {*setup.pattern.marks}:
         _, refined_walk = insert_events(walk, located_events)
@@ -249,7 +216,7 @@ def _solve_EP4(setup: TracingSetup, walk: Walk, located_event: LocatedEvent) -> 
     """The EP4 next to an event, computed from the equations of an EP4; None if there is no EP4."""
     problem, pattern, scale = setup.problem, setup.pattern, setup.curve.scale
     free_count, EP4 = len(problem.free), pattern_of("EP4", problem.model.degree)
-    EP4_problem = prepare_tracing(problem.derive(constraints={}), EP4)
+    EP4_problem = prepare_factors(problem.derive(constraints={}), EP4)
     x, unit = located_event.y * scale, EP4_problem.curve.scale
     guess = _convert_unknowns(pattern, x[setup.unknown_columns], EP4_problem.pattern)
     (solution,) = project_rows(EP4_problem.curve.evaluate, np.array([[*x[:free_count], *guess]]) / unit, [None])
@@ -264,9 +231,15 @@ def _solve_EP4(setup: TracingSetup, walk: Walk, located_event: LocatedEvent) -> 
     exact_point[setup.unknown_columns] = (
         _convert_unknowns(EP4_problem.pattern, (solution * unit)[free_count:], pattern) / scale[setup.unknown_columns]
     )
-    k = int(np.argmin(np.abs(walk.y - exact_point).max(axis=1)))
-    row = k if walk.t[k] @ (exact_point - walk.y[k]) >= 0 else max(k - 1, 0)
-    return LocatedEvent(_EP4, exact_point, located_event.t, row, float(walk.t[row] @ (exact_point - walk.y[row])))
+    return replace(_place_event(setup, _EP4, walk, exact_point), t=located_event.t)
+
+
+def _place_event(setup: Setup, event: Event, walk: Walk, y: Array) -> LocatedEvent:
+    """An event at a point next to a walk."""
+    k = int(np.argmin(np.abs(walk.y - y).max(axis=1)))
+    row = k if walk.t[k] @ (y - walk.y[k]) >= 0 else max(k - 1, 0)
+    (t,) = step_along(setup.curve, y[None], walk.t[[k]], np.zeros(1))[1]
+    return LocatedEvent(event, y, t if np.isfinite(t).all() else walk.t[k], row, float(walk.t[row] @ (y - walk.y[row])))
 
 
 def _convert_unknowns(pattern: Pattern, unknowns: Array, target: Pattern) -> Array:

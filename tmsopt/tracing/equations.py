@@ -17,6 +17,7 @@ from tmsopt.program.nlp import NLP
 from tmsopt.program.starts import complete_starts, sample_box
 from tmsopt.records import Array, Truth
 from tmsopt.roots import Pattern
+from tmsopt.tracing.chain_curve import ChainSetup, has_chain_curve, prepare_chains
 from tmsopt.tracing.continuation import Curve, compile_curve
 from tmsopt.tracing.solving import map_rows
 
@@ -62,9 +63,18 @@ class TracingSetup:
         return sorted(points, key=lambda y: best_first and np.abs(map_rows(self.curve.evaluate, y[None])[0]).max())
 
 
-def prepare_tracing(problem: Posed, pattern: Pattern | None = None) -> TracingSetup:
-    """Compile the equations of a pattern; by default the pattern that the problem locates."""
-    pattern, free_count = pattern or pattern_of(problem.model, str(problem.locate)), len(problem.free)
+Setup = TracingSetup | ChainSetup
+
+
+def prepare_tracing(problem: Posed) -> Setup:
+    """Compile the equations of the pattern that the problem locates."""
+    pattern = pattern_of(problem.model, str(problem.locate))
+    return prepare_chains(problem, pattern) if has_chain_curve(problem) else prepare_factors(problem, pattern)
+
+
+def prepare_factors(problem: Posed, pattern: Pattern) -> TracingSetup:
+    """Compile the equations of a pattern by the factors of the polynomial."""
+    free_count = len(problem.free)
     equalities = {n: c for n, c in problem.constraints.items() if problem.conditions[n].equality}
     nlp = formulate_matching(problem.derive(constraints=equalities), pattern)
     unit, unknown_columns = np.ones(len(nlp.variables)), slice(free_count, free_count + len(pattern.unknowns))

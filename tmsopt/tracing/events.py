@@ -15,8 +15,9 @@ import numpy as np
 from tmsopt.errors import Fault, InputError, input_error, is_number, list_faults, short, suggest, text_faults
 from tmsopt.records import Array, Truth
 from tmsopt.roots.sign_tests import nearest_pair_mean
+from tmsopt.tracing.chain_curve import ChainSetup, name_target
 from tmsopt.tracing.continuation import Curve, Walk, step_along
-from tmsopt.tracing.equations import TracingSetup
+from tmsopt.tracing.equations import Setup
 from tmsopt.tracing.points import ZERO_TOLERANCE, Points, axis_functions
 from tmsopt.tracing.solving import find_zeros
 
@@ -26,9 +27,9 @@ SAME_PLACE = 1e-6
 STABILITY_CHANGES = "stability changes"
 """Detail of weave and capsize events, which are listed only where stability changes."""
 
-_PACKAGE_NAMES = (
-    r"weave|capsize|fold|constraint|end|(double|\d+-fold) zero|\d*C?EP\d\S*"  # names of events of the package
-)
+_PACKAGE_NAMES = r"weave|capsize|fold|constraint|end|resonance|crossing|(double|\d+-fold) zero|\d*C?EP\d\S*"
+"""Names of the events of the package."""
+
 _MIN_DIP = 0.5
 """A minimum between two steps is searched if a parabola predicts a fall by at least this share of the value."""
 _MAX_DEVIATION = 2.0  # largest distance of a zero from its row, in arclengths; a zero farther away is on another curve
@@ -154,6 +155,13 @@ def list_package_events(points: Points) -> Iterator[Event]:
             yield Event(
                 "weave" if k else "capsize", partial(evaluate_axis_function, factor_index, k), detail=STABILITY_CHANGES
             )
+    if isinstance(points.setup, ChainSetup):
+        for k, target in enumerate(points.setup.targets):
+            if target.axis == "real" or (target.axis == "complex" and target.order == 2):
+                name = name_target(replace(target, axis="zero" if target.axis == "real" else "imaginary"))
+                yield Event(name, partial(lambda k, p: p.setup.multiple_roots(p.y)[:, k].real / p.setup.unit, k))
+        for name in ("weave", "capsize") if not problem.model.is_complex else ("weave",):
+            yield Event(name, partial(_rightmost, name), detail=STABILITY_CHANGES)
     for k, parameter in enumerate(problem.free):
         # derivative by the arclength of the parameters, since the unknowns may move much faster
         yield Event("fold", partial(lambda k, p: p.t[:, k] / (p.speed + 1e-300), k), detail=parameter)
@@ -162,7 +170,15 @@ def list_package_events(points: Points) -> Iterator[Event]:
             yield Event("constraint", partial(lambda c, p: c(p.values), condition), detail=name)
 
 
-def locate_events(setup: TracingSetup, walk: Walk, events: Sequence[Event] = ()) -> Iterator[LocatedEvent]:
+def _rightmost(name: str, points: Points) -> Array:
+    """Real part of the rightmost root; nan where the root is real and its passage is no weave, or the reverse."""
+    z = np.where(np.isnan(points.other_roots), -np.inf, points.other_roots)
+    root = z[range(len(z)), np.argmax(z.real, axis=1)]
+    is_weave = (root.imag != 0) | points.setup.problem.model.is_complex
+    return np.where(is_weave == (name == "weave"), root.real, np.nan)
+
+
+def locate_events(setup: Setup, walk: Walk, events: Sequence[Event] = ()) -> Iterator[LocatedEvent]:
     """Every zero of an event between two rows at which its function has different signs."""
     points, free_names = Points(setup, walk.y, walk.t), list(setup.problem.free)
     for event, values in _list_active(points, events):
@@ -206,7 +222,7 @@ def has_sign_change(value: Array) -> Truth:
     return sign[1:] * sign[:-1] < 0
 
 
-def refine_walk(setup: TracingSetup, walk: Walk, events: Sequence[Event] = ()) -> Walk:
+def refine_walk(setup: Setup, walk: Walk, events: Sequence[Event] = ()) -> Walk:
     """The walk with additional points where the function of an event is nearest to 0 between two steps.
 
     Without these points, two zeros between two steps would show no change of sign.
@@ -264,7 +280,8 @@ def _list_active(points: Points, events: Iterable[Event]) -> Iterator[tuple[Even
     special_cases = points.special_cases
     for event in (*list_package_events(points), *events):
         value = points.column(event.function(points))
-        if event.name not in special_cases and (event.name != "fold" or np.abs(value).max() > ZERO_TOLERANCE):
+        may_vanish = event.name in ("fold", "resonance")
+        if event.name not in special_cases and (not may_vanish or np.abs(value).max() > ZERO_TOLERANCE):
             yield event, value
 
 

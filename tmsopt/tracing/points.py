@@ -13,7 +13,8 @@ from tmsopt.roots import lienard_chipart, roots
 from tmsopt.roots.patterns.pattern import mean_size
 from tmsopt.roots.sign_tests import MAX_CLOSED_FORM_DEGREE, opposite_roots_test
 from tmsopt.tracing.branch import name_unknowns
-from tmsopt.tracing.equations import TracingSetup, design_at
+from tmsopt.tracing.chain_curve import ChainSetup
+from tmsopt.tracing.equations import Setup, design_at
 
 ZERO_TOLERANCE = 1e-9  # a function below this value along the whole curve counts as 0
 
@@ -26,7 +27,7 @@ _REAL_TOLERANCE = 1e-6
 class Points:
     """Points y of a traced curve, in units of its scale, and its tangents t, both of shape (n, variables)."""
 
-    setup: TracingSetup
+    setup: Setup
     y: Array
     t: Array
 
@@ -41,7 +42,8 @@ class Points:
     @property
     def unknowns(self) -> list[Array]:
         """The unknowns of the pattern, shape (n,) each."""
-        return list(self.x[:, self.setup.unknown_columns].T)
+        setup = self.setup
+        return setup.unknowns(self.y) if isinstance(setup, ChainSetup) else list(self.x[:, setup.unknown_columns].T)
 
     @property
     def speed(self) -> Array:
@@ -57,9 +59,8 @@ class Points:
 
     @cached_property
     def values(self) -> Values:
-        """Quantities of the points. Roots are computed from the factors, whose multiple roots are exact."""
-        z = roots_along(self.setup.pattern.factors(self.unknowns), len(self))
-        problem = self.setup.problem
+        """Quantities of the points."""
+        z, problem = self.roots, self.setup.problem
         return Values(problem.model, problem.parameter_set, self.parameters, extra=(NO_RADIUS,)).with_known(
             {
                 "abscissa": z.real.max(axis=-1),
@@ -86,13 +87,14 @@ class Points:
     @cached_property
     def stable(self) -> Truth:
         """Where all other roots are left of the imaginary axis by more than rounding errors."""
-        return np.asarray(np.all(self._other_roots.real < -_ROUNDING * np.abs(self._other_roots), axis=-1))
+        return np.asarray(np.all(self.other_roots.real < -_ROUNDING * np.abs(self.other_roots), axis=-1))
 
     @property
     def heavily_damped(self) -> Truth:
         """Where all roots are real, and those that the pattern leaves free are negative."""
-        is_real = np.all(np.abs(self._other_roots.imag) <= _REAL_TOLERANCE * np.abs(self._other_roots), axis=-1)
-        return np.asarray(self.stable & is_real & ("W" not in self.setup.pattern.unknowns))
+        is_real = np.all(np.abs(self.other_roots.imag) <= _REAL_TOLERANCE * np.abs(self.other_roots), axis=-1)
+        can_be_damped = "W" not in self.setup.pattern.unknowns and not self.setup.problem.model.is_complex
+        return np.asarray(self.stable & is_real & can_be_damped)
 
     @property
     def satisfied(self) -> Truth:
@@ -103,7 +105,9 @@ class Points:
 
     @property
     def residual(self) -> Array:
-        """Largest mismatch of a coefficient, relative to its terms."""
+        """Largest mismatch of a coefficient, relative to its terms; of an equation of a chain, relative to L."""
+        if isinstance(self.setup, ChainSetup):
+            return np.asarray(self.setup.measure(self.y)[:, 0])
         monic = self.setup.pattern.monic(self.unknowns)
         a0 = self.column(self.values.coefficients[0])
         unit = self.column(mean_size(monic))
@@ -130,9 +134,23 @@ class Points:
         return np.broadcast_to(np.asarray(value, dtype=float), len(self))
 
     @cached_property
-    def _other_roots(self) -> Complex:
-        """The roots that the pattern leaves free."""
+    def roots(self) -> Complex:
+        """All roots, of which the multiple ones are exact, shape (n, roots)."""
+        if isinstance(self.setup, ChainSetup):
+            return self._spectrum[0]
+        return roots_along(self.setup.pattern.factors(self.unknowns), len(self))
+
+    @cached_property
+    def other_roots(self) -> Complex:
+        """The roots that the pattern does not place on the imaginary axis."""
+        if isinstance(self.setup, ChainSetup):
+            return np.asarray(self._spectrum[0][:, ~self._spectrum[1]])
         return roots_along(self.setup.pattern.remaining_factors(self.unknowns), len(self))
+
+    @cached_property
+    def _spectrum(self) -> tuple[Complex, Truth]:
+        assert isinstance(self.setup, ChainSetup)
+        return self.setup.spectrum(self.y)
 
 
 def _clip_rounding(v: Array, low: float, high: float) -> Array:

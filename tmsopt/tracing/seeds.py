@@ -10,8 +10,9 @@ from tmsopt.problem.problem import Posed
 from tmsopt.program.starts import sample_box
 from tmsopt.records import Array, Truth
 from tmsopt.roots.sign_tests import MAX_CLOSED_FORM_DEGREE
+from tmsopt.tracing.chain_curve import ChainSetup
 from tmsopt.tracing.continuation import INFINITE, Curve, Walk, is_on_walk, walk_both_ways
-from tmsopt.tracing.equations import TracingSetup, compute_coefficients, design_at
+from tmsopt.tracing.equations import Setup, compute_coefficients, design_at
 from tmsopt.tracing.solving import project_rows
 
 _EXTRAPOLATION_SIZE = 300.0  # size of an unknown at which extrapolation through infinity begins
@@ -90,7 +91,7 @@ def walk_new_curves(
 
 
 def find_seeds(
-    setup: TracingSetup, starts: int, seed: int, through: Sequence[Mapping[str, float]], walks: Sequence[Walk]
+    setup: Setup, starts: int, seed: int, through: Sequence[Mapping[str, float]], walks: Sequence[Walk]
 ) -> Iterator[tuple[int, list[Array]]]:
     """For each design, the number of designs so far, and the points of the pattern's curves near this design.
 
@@ -117,12 +118,12 @@ def find_seeds(
             useless_count, walk_count = (useless_count + 1 if len(walks) == walk_count else 0), len(walks)
 
 
-def _choose_grid_test(setup: TracingSetup) -> Callable[[Sequence[Any]], Any] | None:
+def _choose_grid_test(setup: Setup) -> Callable[[Sequence[Any]], Any] | None:
     """The function whose sign changes on a grid show every branch that is not too short, if there is one."""
     return setup.pattern.test if len(setup.problem.free) == 2 else None
 
 
-def find_missed_seeds(setup: TracingSetup, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
+def find_missed_seeds(setup: Setup, walks: Sequence[Walk]) -> Iterator[tuple[int, list[Array]]]:
     """Points of curves that are not walked yet: near sign changes on a grid, and where curves return from infinity."""
     test = _choose_grid_test(setup)
     missed = find_missed_designs(setup.problem, setup.curve, test, walks) if test else ()
@@ -130,7 +131,7 @@ def find_missed_seeds(setup: TracingSetup, walks: Sequence[Walk]) -> Iterator[tu
         yield 0, _project_designs(setup, [design])[0]
 
 
-def _list_designs_beyond_infinity(setup: TracingSetup, walks: Sequence[Walk]) -> Iterator[dict[str, Any]]:
+def _list_designs_beyond_infinity(setup: Setup, walks: Sequence[Walk]) -> Iterator[dict[str, Any]]:
     """Designs near which a curve may return from infinity, where a root goes from −∞ to +∞ or back.
 
     The distance of the parameters from a0 = 0 is proportional to the inverse of the unknown that grows. So two points
@@ -151,13 +152,17 @@ def _list_designs_beyond_infinity(setup: TracingSetup, walks: Sequence[Walk]) ->
 
 
 def _project_designs(
-    setup: TracingSetup,
+    setup: Setup,
     designs: Sequence[Mapping[str, float]],
     held_variables: Sequence[int | None] = (None,),
     max_guesses: int = 1,
 ) -> list[list[Array]]:
     """Points of the curves in the box near each design, from the best guesses, with one variable held constant."""
     curve, free_count = setup.curve, len(setup.problem.free)
+    if isinstance(setup, ChainSetup):
+        rng = np.random.default_rng(0)  # every second design chooses freely which eigenvalues shall meet
+        found = [setup.find_point(design, rng if k % 2 else None) for k, design in enumerate(designs)]
+        return [[y] if y is not None and np.all((curve.lower <= y) & (y <= curve.upper)) else [] for y in found]
     starts = [
         (k, y)
         for k, design in enumerate(designs)

@@ -20,7 +20,7 @@ _MAX_HALVINGS = 100  # largest number of steps towards a zero
 
 
 @np.errstate(over="ignore")
-def project_rows(system: ca.Function, y: Array, held_variables: Sequence[int | None]) -> Array:
+def project_rows(system: Any, y: Array, held_variables: Sequence[int | None]) -> Array:
     """Solutions near the rows of y by the damped Gauss–Newton method; nan where there is no solution.
 
     Args:
@@ -86,14 +86,17 @@ def find_zeros(function: Callable[[Array], Array], ends: Array) -> Array:
     return zeros
 
 
-def evaluate_rows(system: ca.Function, y: Array) -> tuple[Array, Array]:
+def evaluate_rows(system: Any, y: Array) -> tuple[Array, Array]:
     """Equations and Jacobians at the rows of y, shapes (rows, m) and (rows, m, n)."""
     value, jacobian = map_rows(system, y)
     return value, jacobian.reshape(*y.shape, value.shape[1]).transpose(0, 2, 1)
 
 
-def map_rows(function: ca.Function, *arguments: Array) -> list[Array]:
-    """Evaluate a function of dense columns at every row of its arguments."""
+def map_rows(function: Any, *arguments: Array) -> list[Array]:
+    """Evaluate a function of dense columns, or a Python function of arrays of rows, at every row of its arguments."""
+    if not isinstance(function, ca.Function):
+        rows: list[Array] = function(*arguments)
+        return rows
     # a power of 2, so that few maps are made, since making one takes long
     count = 1 << max(len(arguments[0]) - 1, 0).bit_length()
     return MappedFunction(function, count)(*arguments)

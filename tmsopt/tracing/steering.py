@@ -10,7 +10,7 @@ from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.tracing.branch import BranchPoint, table_at
 from tmsopt.tracing.continuation import CLOSED, CurvePoint, End, Walk, compute_tangent, follow
 from tmsopt.tracing.description import describe_end, find_events, make_branch
-from tmsopt.tracing.equations import TracingSetup, prepare_tracing
+from tmsopt.tracing.equations import Setup, prepare_tracing
 from tmsopt.tracing.events import SAME_PLACE, Event, check_events
 from tmsopt.tracing.seeds import find_seeds
 from tmsopt.tracing.trace import STARTS, STEP, check_options, locate_pattern
@@ -87,7 +87,7 @@ class Continuation(Iterator[BranchPoint]):
 
     end: str
 
-    def __init__(self, setup: TracingSetup, start: CurvePoint, step: float, events: Sequence[Event]) -> None:
+    def __init__(self, setup: Setup, start: CurvePoint, step: float, events: Sequence[Event]) -> None:
         self._setup, self._step, self._events = setup, step, events
         self._sign, self._arclength, self._last_point, self.end = 1, 0.0, start, ""
         self._points = self._follow(start, yields_start=True)

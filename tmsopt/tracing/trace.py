@@ -21,16 +21,15 @@ from tmsopt.errors import (
     table_faults,
 )
 from tmsopt.models.user_spectrum import pattern_of, patterns_of
-from tmsopt.problem.evaluate import require_polynomial
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.symmetry import reduce_problem
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array
 from tmsopt.tracing.branch import Trace
+from tmsopt.tracing.chain_curve import has_chain_curve
 from tmsopt.tracing.continuation import Walk
-from tmsopt.tracing.description import make_branches, restate_branch
+from tmsopt.tracing.description import make_branches
 from tmsopt.tracing.equations import prepare_tracing
 from tmsopt.tracing.events import Event, check_events
 from tmsopt.tracing.seeds import find_missed_seeds, find_seeds, walk_new_curves
@@ -79,12 +78,11 @@ def trace(
     More: docs/how_to/tracing.md
     """
     started = time.perf_counter()
-    problem, checked_events = locate_pattern(require_polynomial(pose(problem)), pattern), check_events(events)
+    problem, checked_events = locate_pattern(pose(problem), pattern), check_events(events)
     counts = ("starts", starts, 0, MOST_STARTS), ("seed", seed, 0, None), ("most", most, _MIN_POINTS, None)
     check_options(problem, step, *counts, through=through, progress=progress)
     steps = start_steps(progress, f"tracing {problem.locate}", "start")
-    reduced = reduce_problem(problem)
-    setup = prepare_tracing(reduced or problem)
+    setup = prepare_tracing(problem)
     walks: list[Walk] = []
     tried_starts = 0
 
@@ -100,8 +98,6 @@ def trace(
     with np.errstate(all="ignore"):  # values near infinity may not be finite
         # a branch with the residual nan is left out
         branches = [b for w in walks for b in make_branches(setup, w, checked_events) if b.residual <= _MAX_RESIDUAL]
-    if reduced:
-        branches = [restate_branch(problem, b) for b in branches]
     branches.sort(key=lambda b: -float(b.arclength[-1]))
     seconds = time.perf_counter() - started
     return Trace(
@@ -128,7 +124,7 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
         raise input_error(message, "objective", "locate") from error
     problem_with_pattern = problem.derive(locate=name, minimize=None, maximize=None)
     freedom = degrees_of_freedom(problem_with_pattern)
-    if freedom.count != 1:
+    if freedom.count > 1 or (freedom.count < 1 and not _has_curve(problem_with_pattern)):
         free, needed_count = ", ".join(problem.free) or "none", freedom.conditions + 1
         advice = (
             f"free {needed_count - freedom.free} more"
@@ -142,6 +138,16 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
         )
         raise input_error(message, "parameters")
     return problem_with_pattern
+
+
+def _has_curve(problem: Posed) -> bool:
+    """Whether the chains have a curve although the problem counts too many conditions, because some are dependent."""
+    if not has_chain_curve(problem) or not problem.free:
+        return False
+    setup, walks = prepare_tracing(problem), list[Walk]()
+    seeds = (points for _, points in find_seeds(setup, _FEW_STARTS, 0, (), walks))
+    walk_new_curves(setup.curve, seeds, STEP, _MIN_POINTS, walks)
+    return bool(walks)
 
 
 def check_options(
@@ -180,5 +186,6 @@ STEP_RANGE = (1e-6, 0.1)
 """Smallest and largest `step`."""
 
 _DESIGN_EXAMPLE = "{'Fr': 1.2, 'mu': 0.1}"
+_FEW_STARTS = 6  # designs from which a curve is searched that has more conditions than the problem counts
 _MIN_POINTS = 4  # smallest accepted `most`
 _MAX_RESIDUAL = 1e-3  # largest mismatch of a coefficient on a curve of the pattern
