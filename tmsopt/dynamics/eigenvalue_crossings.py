@@ -43,9 +43,7 @@ def choose_grid_size(count: int) -> int:
     return _GRID_POINTS if count <= _MANY_EIGENVALUES else _GRID_POINTS // 4
 
 
-def find_eigenvalue_crossings(
-    problem: Posed, parameters: Numbers, name: str, lower: float, upper: float
-) -> Crossings:
+def find_eigenvalue_crossings(problem: Posed, parameters: Numbers, name: str, lower: float, upper: float) -> Crossings:
     """Crossings with lower < y < upper for the parameter y, as far as a grid of values shows them.
 
     Args:
@@ -80,7 +78,9 @@ def find_eigenvalue_crossings(
     def describe(y: float, root: Root) -> Crossing:
         s, k, cell = scan.evaluate(np.array([y])).s, root.multiplicity, ends.index(y)
         is_pair, tolerance = root.im != 0 or family.is_complex, size * _ACCURACY ** (1 / k)
-        kind = f"{'C' if root.im and not family.is_complex else ''}EP{k}" if k > 1 else "weave" if is_pair else "capsize"
+        kind = (
+            f"{'C' if root.im and not family.is_complex else ''}EP{k}" if k > 1 else "weave" if is_pair else "capsize"
+        )
         changes = bool(is_bounded[cell - 1] != is_bounded[cell])
         return Crossing(y, kind, root, bool((s.real <= root.re + tolerance).all()), changes)
 
@@ -136,7 +136,9 @@ class _Spectra:
         """`Crossings.zeros` and `Crossings.always`, as far as these values show them."""
         zeros = 0 if is_complex else int((np.abs(self.s) <= self.errors).sum(axis=-1).min())
         mirror = np.abs(self.s[:, :, None] + self.s[:, None, :].conj())
-        is_mirrored = (mirror <= self.errors[:, :, None] + self.errors[:, None, :]).any(axis=-1).sum(axis=-1).min() > zeros
+        is_mirrored = (mirror <= self.errors[:, :, None] + self.errors[:, None, :]).any(axis=-1).sum(
+            axis=-1
+        ).min() > zeros
         holds = {"capsize": zeros > 0, "weave": is_mirrored, "EP2": self.count_meetings(zeros).min() > 0}
         return zeros, tuple(kind for kind, is_permanent in holds.items() if is_permanent)
 
@@ -153,7 +155,11 @@ class _Scan:
 
     def evaluate(self, values: Array) -> _Spectra:
         """Eigenvalues at values of the parameter."""
-        columns, model, parameter_set = {**self.others, self.name: values}, self.problem.model, self.problem.parameter_set
+        columns, model, parameter_set = (
+            {**self.others, self.name: values},
+            self.problem.model,
+            self.problem.parameter_set,
+        )
         matrices = evaluate_matrices(model, parameter_set, columns)
         found = find_conditioning(matrices)
         size, errors = np.abs(found.eigenvalues).max(axis=-1, keepdims=True), _ROUNDING * found.condition
