@@ -8,6 +8,7 @@ import json
 from math import comb, factorial, sqrt
 
 import flint
+import mpmath
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -351,3 +352,49 @@ def test_all_designs_take_no_diagnosis():
     ended = CliRunner().invoke(main, ["solve", "problems/coupled_pair.toml", "--all", "--full"])
     assert ended.exit_code == 2
     assert "--full" in ended.output
+
+
+def test_how_an_EP2_of_forty_modes_splits():
+    """f(ω, z) = (sin 41θ − z sin 40θ)/sin θ is 0 for ω = 2 cos θ, so ω moves by √(−2 f_z Δz/f_ωω); 40 digits."""
+    n = 40
+    rows = [[0.0] * n for _ in range(n)]
+    for j in range(n - 1):
+        rows[j][j + 1], rows[j + 1][j] = 1.25, 0.8
+    rows[0][0] = "x + 1j*y"
+    problem = tmsopt.Problem(from_hamiltonian(rows), free={"x": (-3, 3), "y": (-3, 3)}, locate="EP2")
+    (found,) = tmsopt.diagnose(point := tmsopt.solve(problem))
+    assert (found.kind, found.algebraic, found.geometric, found.partial) == ("defective", 2, 1, (2,))
+
+    def f(omega, z):
+        theta = mpmath.acos(omega / 2)
+        return (mpmath.sin((n + 1) * theta) - z * mpmath.sin(n * theta)) / mpmath.sin(theta)
+
+    def slope(omega, z):
+        return mpmath.diff(lambda w: f(w, z), omega)
+
+    with mpmath.workdps(40):
+        z = mpmath.mpc(point.parameters["x"], point.parameters["y"])
+        omega, z = mpmath.findroot(lambda w, z: [f(w, z), slope(w, z)], (mpmath.mpc(found.eigenfrequency), z))
+        ratio = 2 * mpmath.diff(lambda q: f(omega, q), z) / mpmath.diff(lambda w: f(w, z), omega, 2)  # (Δs)² = −(Δω)²
+        expected = {"x": complex(ratio * z.real), "y": complex(ratio * 1j * z.imag)}
+    for response in found.responses:
+        (law,) = response.laws
+        assert (law.branches.roots, 2 * law.branches.exponent, response.unresolved) == (2, 1, 0)
+        assert law.branches.constants[0] == pytest.approx(expected[response.parameter], rel=1e-9)
+        assert law.least < 1e-9
+        assert min(law.below, law.above) > 1e-4
+
+
+def test_how_an_EP4_of_large_matrices_splits():
+    """i g S_z + S_x of spin 3/2, next to six other modes: s² = (g² − 1) m², so s⁴ has no term of order 1 in g − 1;
+    a coupling e of the ends moves all four by t⁴ = c ε, from the characteristic polynomial of the block."""
+    block = [["1.5j*g", "sqrt(3)/2", 0, "e"], ["sqrt(3)/2", "0.5j*g", 1, 0]]
+    block += [[0, 1, "-0.5j*g", "sqrt(3)/2"], ["e", 0, "sqrt(3)/2", "-1.5j*g"]]
+    rows = [[*row, *[0] * 6] for row in block] + [[0] * (4 + k) + [5 + k] + [0] * (5 - k) for k in range(6)]
+    (found,) = tmsopt.diagnose(tmsopt.Problem(from_hamiltonian(rows), fixed={"g": 1.0, "e": 0.0}))
+    responses = {r.parameter: r for r in found.responses}
+    (law,) = responses["e"].laws
+    # det(ω − H) = ω⁴ − 2 e t₁ t₂ t₃ + … with the couplings √3/2, 1, √3/2, and s⁴ = ω⁴
+    assert law.branches.constants[0] == pytest.approx(1.5, rel=1e-9)
+    assert (law.branches.roots, law.branches.denominator, responses["g"].laws) == (4, 4, ())
+    assert responses["g"].unresolved == 4

@@ -54,13 +54,13 @@ def test_a_large_mechanical_system_with_one_damper_that_feeds():
     identity = np.eye(n).tolist()
     D = [["d + 2" if a == b else -float(abs(a - b) == 1) for b in range(n)] for a in range(n)]
     problem = tmsopt.Problem(from_matrices(M=identity, D=D, K=(4 * np.eye(n)).tolist()), fixed={"d": 0.0})
-    found = tmsopt.speeds(problem, "d", between=(-6, 1))
+    found = tmsopt.speeds(problem, "d", between=(-6, 0.9))
     nu = 2 - 2 * np.cos(np.pi * np.arange(1, n + 1) / (n + 1))
     flutter = [c.at for c in found.found if c.kind == "weave"]
     assert flutter == pytest.approx(sorted(-nu), abs=1e-11)
     doubles = [c.at for c in found.found if c.kind == "EP2"]  # where (d + ν)² = 4 · 4
-    assert doubles == pytest.approx(sorted(x for y in nu for x in (4 - y, -4 - y) if -6 < x < 1), abs=1e-11)
-    assert found.stable[0] == pytest.approx((max(-nu), 1))
+    assert doubles == pytest.approx(sorted(x for y in nu for x in (4 - y, -4 - y) if -6 < x < 0.9), abs=1e-11)
+    assert found.stable[0] == pytest.approx((max(-nu), 0.9))
 
 
 def test_an_open_range_has_no_grid():

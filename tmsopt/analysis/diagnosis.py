@@ -1,26 +1,32 @@
 """Diagnoses a multiple root: its multiplicities, its Jordan chains, and how it splits when a parameter changes."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import flint
 import numpy as np
 
 from tmsopt.analysis.root_point import RootPoint, evaluate_pencil, high_precision, midpoint, refine_point, refine_root
 from tmsopt.analysis.sensitivity import measure_sensitivity, sensitivity_to_json
-from tmsopt.analysis.splitting import DEVIATION, Law, Response, compute_response
+from tmsopt.analysis.splitting import DEVIATION, Law, Response, compute_chain_response, compute_response
+from tmsopt.chains import family_of
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.user_spectrum import eigenfrequencies
 from tmsopt.problem.evaluate import evaluate_matrices
 from tmsopt.problem.files import ProblemSource
+from tmsopt.problem.problem import Posed
+from tmsopt.problem.quantities import matrices_at
 from tmsopt.problem.real_form import has_real_form
 from tmsopt.progress import Listener, start_steps
-from tmsopt.records import Numbers, Printable, plain
+from tmsopt.records import Complex, Numbers, Printable, plain
 from tmsopt.roots import Root, Structure, backward_error
+from tmsopt.roots.chains import Chain, eigenvalues_of, find_borders, make_chain
 from tmsopt.roots.jordan import Jordan, is_regular, jordan
 from tmsopt.search.solve import solve_if_needed
 
+_ROUNDED_ZERO = 1e-12  # a value of at most this share of its range may be a rounded 0
 _ZERO_SINGULAR_VALUE = 1e-7  # largest relative singular value that counts as 0
 _DISTANCE_FACTOR = 10.0  # the same in units of √distance, the size of such values near a semisimple root
 
@@ -105,7 +111,10 @@ def diagnose(design: ProblemSource, *, progress: Listener | None = None) -> tupl
     start_steps(progress, "splitting roots")
     problem = solution.problem.posed
     parameters = solution.worst.applied(solution.parameters) if solution.worst else dict(solution.parameters)
-    values, structure = problem.values(parameters), Structure(solution.structure, solution.roots, 0.0)
+    structure = Structure(solution.structure, solution.roots, 0.0)
+    if not has_real_form(problem.model):
+        return tuple(_diagnose_chains(problem, parameters, structure))
+    values = problem.values(parameters)
     structure_at_design = values["structure"]
     assert isinstance(structure_at_design, Structure)
     # to satisfy a limit, the stored parameters may differ slightly from those at which the roots are multiple
@@ -171,6 +180,56 @@ def diagnose_roots(
             )
             diagnoses.append(diagnosis)
     return tuple(diagnoses)
+
+
+def _diagnose_chains(problem: Posed, parameters: Numbers, structure: Structure) -> Iterator[Diagnosis]:
+    """Diagnose the multiple eigenvalues of matrices without a polynomial, in doubles, to leading order."""
+    model, parameter_set = problem.model, problem.parameter_set
+    family = family_of(problem.derive(free={n: (x - 1, x + 1) for n, x in parameters.items()}, fixed={}))
+    matrices, slopes = family.expand(np.array([*parameters.values()]))
+    balls = evaluate_pencil(model, parameter_set, {n: flint.arb(x) for n, x in parameters.items()})
+    for root in structure.roots:
+        s, k = complex(root.re, root.im), root.multiplicity
+        if k == 1 or (root.im < 0 and not model.is_complex):
+            continue
+        chains, responses = (
+            jordan(balls, flint.acb(s), k, _ZERO_SINGULAR_VALUE),
+            [Response(n, False, (), 0, k) for n in parameters],
+        )
+        if chains.geometric == 1:
+            chain = make_chain(matrices, s, k, find_borders(matrices, s)[0])
+            chain = make_chain(matrices, s, k, chain.borders)
+            responses = [_respond(problem, parameters, chain, n, D) for n, D in zip(parameters, slopes, strict=True)]
+        kind = "semisimple" if chains.geometric == k else "defective" if chains.geometric == 1 else "partly defective"
+        yield Diagnosis(
+            s.real,
+            s.imag,
+            k,
+            chains.geometric,
+            chains.partial,
+            kind,
+            chains,
+            structure.distance,
+            tuple(sorted(responses, key=_rank_response)),
+            1j * s if model.is_complex else None,
+            **measure_sensitivity(matrices, s, k, kind != "semisimple"),
+        )
+
+
+def _respond(problem: Posed, parameters: Numbers, chain: Chain, name: str, change: Complex) -> Response:
+    """The response of an eigenvalue to one parameter, relative to its value unless this may be a rounded 0."""
+    value, (low, high) = parameters[name], problem.free.get(name, (0.0, 0.0))
+    relative = abs(value) > _ROUNDED_ZERO * (high - low)
+    step = value if relative else 1.0
+    return compute_chain_response(
+        chain,
+        name,
+        relative,
+        step * change,
+        lambda e: eigenvalues_of(
+            matrices_at(problem.model, problem.parameter_set, {**parameters, name: value + e * step})
+        ),
+    )
 
 
 def _rank_response(response: Response) -> tuple[float, float]:

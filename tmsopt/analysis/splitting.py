@@ -1,15 +1,16 @@
 """Finds laws by which a multiple root splits when a parameter changes, and confirms each law by computed roots."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import flint
 import numpy as np
-from numpy.typing import NDArray
 
 from tmsopt.analysis.puiseux import Branches, find_branches
 from tmsopt.analysis.root_point import RootPoint, coefficients_of_order, midpoint
+from tmsopt.records import Complex
+from tmsopt.roots.chains import Chain
 
 DEVIATION = 0.1
 """Largest relative deviation of a root from the leading term for which the law holds."""
@@ -23,6 +24,10 @@ _SMALL_RADII = (1e-11, 1e-8, 1e-5)  # radii for this count, relative to the smal
 _WIDE_RADII = (1e-3, 3e-2)  # further radii if other roots move
 _MIN_SHIFT = 2  # smallest shift that is tested, relative to the distance of the roots that nearly meet
 _SCATTER_RADIUS = 8  # radius for the count if no root moves, relative to the same distance
+_NEGLIGIBLE_SLOPE = 1e-10  # share of the sizes of its factors that counts as 0 in doubles, near a design with 12 digits
+
+_Shifts = Callable[[float, float], list[complex]]
+"""ε and the size of the predicted shifts → the shifts."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,19 @@ def compute_response(point: RootPoint, name: str) -> Response:
     if terms is None:
         return Response(name, relative, (), 0, k)
     branches, unmoved = find_branches(terms)
-    laws = [law for branch in branches if (law := _confirm_law(point, name, branch))]
+    min_shift = _MIN_SHIFT * _measure_scatter(point)
+
+    def find_shifts(eps: float, scale: float) -> list[complex]:
+        """The shifts of the nearest roots after a change by ε, divided by the unit."""
+        shifted = _expand_locally(point, name, eps, scale)
+        # In the variable 1/t the smallest t are the largest roots, which companion eigenvalues give to all digits.
+        coefficients = np.array([midpoint(c / shifted[point.multiplicity].abs_upper()) for c in shifted])
+        sizes = np.abs(coefficients)
+        coefficients[np.cumsum(sizes) <= _NEGLIGIBLE_SHARE * sizes.sum()] = 0  # roots that move far more slowly
+        inverse = np.roots(coefficients) if np.all(np.isfinite(coefficients)) else np.zeros(0)
+        return list(scale / inverse[inverse != 0])
+
+    laws = [law for branch in branches if (law := _confirm_law(branch, find_shifts, min_shift, point.unit))]
     if unmoved and not _has_fixed_roots(point, name, branches, unmoved):
         unmoved = 0
     unresolved = k - unmoved - sum(law.branches.roots for law in laws)
@@ -93,29 +110,42 @@ def _expand_terms(point: RootPoint, name: str) -> list[list[complex]] | None:
     ]
 
 
-def _confirm_law(point: RootPoint, name: str, branch: Branches) -> Law | None:
+def compute_chain_response(
+    chain: Chain, name: str, relative: bool, change: Complex, find_eigenvalues: Callable[[float], Complex]
+) -> Response:
+    """Response of an eigenvalue with one Jordan chain: tᵏ = −(∂F₀/∂ε) ε/Fₖ, if ∂F₀/∂ε is not 0.
+
+    Args:
+        change: derivatives of the matrices with respect to ε.
+        find_eigenvalues: function from ε to the eigenvalues.
+    """
+    k, slope = chain.order, chain.respond(change)[0]
+    if abs(slope) <= _NEGLIGIBLE_SLOPE * np.linalg.norm(chain.left[0]) * np.linalg.norm(change) * np.linalg.norm(
+        chain.right[0]
+    ):
+        return Response(name, relative, (), 0 if change.any() else k, k if change.any() else 0)
+    scatter = float(np.sort(np.abs(find_eigenvalues(0.0) - chain.s))[k - 1])
+    branch = Branches(k, 1, k, (complex(-slope / chain.values[k]),))
+    law = _confirm_law(branch, lambda eps, _: list(find_eigenvalues(eps) - chain.s), _MIN_SHIFT * scatter, 1.0)
+    return Response(name, relative, (law,) if law else (), 0, 0 if law else k)
+
+
+def _confirm_law(branch: Branches, find_shifts: _Shifts, min_shift: float, unit: float) -> Law | None:
     """The law with its range of validity; None unless roots obey it for both signs of ε and over two decades."""
-    ends = [_find_validity_range(point, name, branch, sign) for sign in (-1, 1)]
+    ends = [_find_validity_range(branch, find_shifts, min_shift, sign) for sign in (-1, 1)]
     if any(high < 10**_MIN_DECADES * max(low, 10.0 ** _DECADES[0]) for low, high in ends):
         return None
-    scaled_branch = replace(branch, constants=tuple(c * point.unit**branch.denominator for c in branch.constants))
+    scaled_branch = replace(branch, constants=tuple(c * unit**branch.denominator for c in branch.constants))
     return Law(scaled_branch, ends[0][1], ends[1][1], max(low for low, _ in ends))
 
 
-def _find_validity_range(point: RootPoint, name: str, branch: Branches, sign: int) -> tuple[float, float]:
+def _find_validity_range(branch: Branches, find_shifts: _Shifts, min_shift: float, sign: int) -> tuple[float, float]:
     """The smallest and the largest sampled |ε| between which the roots obey the law; (0, 0) if they never do."""
 
     def is_obeyed(eps: float) -> bool:
         predicted = branch.shifts(sign * eps)
-        scale = max(map(abs, predicted))
-        shifted = _expand_locally(point, name, sign * eps, scale)
-        # In the variable 1/t the smallest t are the largest roots, which companion eigenvalues give to all digits.
-        coefficients = np.array([midpoint(c / shifted[point.multiplicity].abs_upper()) for c in shifted])
-        sizes = np.abs(coefficients)
-        coefficients[np.cumsum(sizes) <= _NEGLIGIBLE_SHARE * sizes.sum()] = 0  # roots that move far more slowly
-        return _measure_deviation(predicted, scale, coefficients) <= DEVIATION
+        return _measure_deviation(predicted, find_shifts(sign * eps, max(map(abs, predicted)))) <= DEVIATION
 
-    min_shift = _MIN_SHIFT * _measure_scatter(point)
     decades = [m for m in _DECADES if max(map(abs, branch.shifts(sign * 10.0**m))) > min_shift]
     first_decade = next((m for m in decades if is_obeyed(10.0**m)), None)
     if first_decade is None:
@@ -161,14 +191,9 @@ def _measure_scatter(point: RootPoint) -> float:
     return float(max(abs(x / terms[k]) ** (1 / (k - j)) for j, x in enumerate(terms[:k])))
 
 
-def _measure_deviation(predicted: Sequence[complex], scale: float, coefficients: NDArray[np.complex128]) -> float:
-    """The largest relative distance of a predicted shift from the nearest true shift; inf if there are too few.
-
-    Args:
-        coefficients: coefficients of the polynomial in scale/t, descending.
-    """
-    inverse = np.roots(coefficients) if np.all(np.isfinite(coefficients)) else np.zeros(0)
-    true_shifts, worst_deviation = list(scale / inverse[inverse != 0]), 0.0
+def _measure_deviation(predicted: Sequence[complex], true_shifts: list[complex]) -> float:
+    """The largest relative distance of a predicted shift from the nearest true shift; inf if there are too few."""
+    worst_deviation = 0.0
     for t in predicted:
         nearest_index = min(range(len(true_shifts)), key=lambda i: abs(true_shifts[i] - t), default=None)
         if nearest_index is None:

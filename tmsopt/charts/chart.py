@@ -275,7 +275,8 @@ def chart(
         "per_second": computed_count / seconds,
     }
     source_problem = survey.problem.problem
-    exact_domain = domain(source_problem, progress=progress) if boundaries and len(grid.axes) == 2 else None
+    is_plane = boundaries and len(grid.axes) == 2 and survey.problem.model.polynomial is not None
+    exact_domain = domain(source_problem, progress=progress) if is_plane else None
     return Chart(
         about, grid.values, tiles.layers, add_tallies(tiles.tallies.values()), exact_domain, path, run, source_problem
     )

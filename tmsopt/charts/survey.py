@@ -16,7 +16,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from tmsopt.errors import Fault, InputError, input_error, list_faults, short, suggest, table_faults
 from tmsopt.problem.advice.names import example_of
-from tmsopt.problem.evaluate import ArrayFunction, array_function, find_eigenvalues, parse_all, require_polynomial
+from tmsopt.problem.evaluate import ArrayFunction, array_function, describe_eigenvalues, find_eigenvalues, parse_all
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import RADIUS, ROOT_NAMES
@@ -161,20 +161,20 @@ class Survey:
         with np.errstate(all="ignore"):  # overflow counts as undefined
             values = self.formulas(columns)
             coefficients = [np.broadcast_to(values[n], shape) for n in model.coefficient_names() if n in values]
-            if {"kind", "real_roots", "abscissa", "damping_ratio"} & layers or self.root_formulas.names:
-                require_polynomial(self.problem)
-            if {"kind", "real_roots"} & layers:
-                values |= vars(classify(coefficients))
-            if self.root_formulas.names or {"abscissa", "damping_ratio"} & layers:
-                motion = find_motion(coefficients)
-                fallbacks = motion.fallbacks
-                ratio = motion.damping_ratio if not model.is_complex else np.full(shape, np.nan)
-                root_quantities = {"abscissa": motion.abscissa, "damping_ratio": ratio}
-                values |= root_quantities | self.root_formulas(columns | root_quantities)
-            if _EIGENVECTOR_LAYERS & layers:
+            needs_roots, root_quantities = self.root_formulas.names or _ROOT_LAYERS & layers, dict[str, Any]()
+            if _EIGENVECTOR_LAYERS & layers or (needs_roots and model.polynomial is None):
                 eigenvalues = find_eigenvalues(model, self.problem.parameter_set, columns)
                 values["petermann"] = np.fmax.reduce(eigenvalues.petermann, axis=-1)
                 values["phase_rigidity"] = np.fmin.reduce(eigenvalues.phase_rigidity, axis=-1)
+                if model.polynomial is None:
+                    root_quantities = describe_eigenvalues(eigenvalues.eigenvalues, model.is_complex)
+            if {"kind", "real_roots"} & layers and model.polynomial is not None:
+                values |= vars(classify(coefficients))
+            if model.polynomial is not None and (self.root_formulas.names or {"abscissa", "damping_ratio"} & layers):
+                root_quantities = vars(find_motion(coefficients))
+                fallbacks = root_quantities["fallbacks"]
+            if root_quantities:
+                values |= root_quantities | self.root_formulas(columns | root_quantities)
             if {"satisfied", "margin"} & layers:
                 margins = [-c.sign * values[_LIMIT + n] for n, c in limits_of(self.problem).items()]
                 values["margin"] = reduce(np.minimum, margins, np.inf)

@@ -4,14 +4,16 @@ Eigenvalues on a grid of values show between which of them one crosses or two me
 (`tmsopt.roots.chains`) then give the value to rounding. Nothing is proved between the values of the grid.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from tmsopt.chains import Family, Target, family_of, refine
+from tmsopt.chains.points import Axis
 from tmsopt.dynamics.crossings import Crossing, Crossings, merge_bands
 from tmsopt.errors import input_error
 from tmsopt.problem.evaluate import evaluate_matrices
@@ -27,9 +29,10 @@ _OFFSET = 0.382  # of the grid, in steps, so that no round number is on it
 _HALVINGS = 12  # of a step of the grid with a crossing, before the Newton steps
 _ROUNDING = 64 * float(np.finfo(float).eps)  # error of an eigenvalue with the condition number 1
 _UNKNOWN_ERROR = 1e-10  # error where the condition number is unknown, relative to the eigenvalues
-_MEETING = 0.4
-"""Two eigenvalues may meet in a step if the square of their difference passes 0 at a distance of at most this share of
-its change: it changes its sign at an EP2, and turns by 120° at an EP3, which makes 0.29."""
+_SHIFT = 1e-4  # of a value for the slopes of the eigenvalues, in steps of the grid
+_MEETING_CENTRE, _MEETING_RADIUS = 0.5, 1.5
+"""Two eigenvalues may meet if the square of their difference, continued by its slope, is 0 within this circle, in steps
+of the grid. Where k eigenvalues meet at a distance of t steps, the slope leads to k t/2."""
 _FIRST_ORDERS, _HIGHER_ORDERS = (3, 2), range(8, 3, -1)
 """Orders of a multiple eigenvalue. The higher ones are tried if Newton steps for one of the first ones succeed."""
 _MAX_MOVE = 2.0  # of Newton steps for a multiple eigenvalue, in steps of the grid
@@ -59,8 +62,8 @@ def find_eigenvalue_crossings(problem: Posed, parameters: Numbers, name: str, lo
     if not len(grid.values):
         raise input_error("is singular for every value; accepted: matrices without a root at infinity", "M")
     found, size, rounding = list[tuple[float, Root]](), np.abs(grid.s).max(), _ACCURACY * max(abs(lower), abs(upper))
-    for y, root in (*_find_meetings(scan, grid), *_find_crossings(scan, grid)):
-        y = next((x for x, _ in found if abs(x - y) <= rounding), y)
+    for place, root in (*_find_meetings(scan, grid), *_find_crossings(scan, grid)):
+        y = next((x for x, _ in found if abs(x - place) <= rounding), place)
         distances = ((abs(x - y), abs(complex(r.re, r.im) - complex(root.re, root.im))) for x, r in found)
         is_new = all(dy > _SAME * scan.step or ds > _SAME * size for dy, ds in distances)
         found += [(y, root)] * (is_new and lower < y < upper)
@@ -83,8 +86,11 @@ def find_eigenvalue_crossings(problem: Posed, parameters: Numbers, name: str, lo
         changes = bool(is_bounded[cell - 1] != is_bounded[cell])
         return Crossing(y, kind, root, bool((s.real <= root.re + tolerance).all()), changes)
 
-    bands = [merge_bands(cells, flags.tolist()) for flags in (stable, damped, marginal)]
-    return Crossings(tuple(describe(*event) for event in found), *bands[:2], always, bands[2], zeros)
+    stable_bands, damped_bands, marginal_bands = (
+        merge_bands(cells, flags.tolist()) for flags in (stable, damped, marginal)
+    )
+    events = tuple(describe(*event) for event in found)
+    return Crossings(events, stable_bands, damped_bands, always, marginal_bands, zeros)
 
 
 @dataclass(frozen=True)
@@ -175,8 +181,8 @@ class _Scan:
         if not (point.is_found and point.is_isolated and abs(point.p[0] - y) <= reach * self.step):
             return None
         rounding = _ACCURACY * max(abs(s), self.family.typical_size)
-        parts = (float(x) if abs(x) > rounding else 0.0 for x in (point.roots[0].real, point.roots[0].imag))
-        return float(point.p[0]), Root(*parts, target.order)
+        re, im = (float(x) if abs(x) > rounding else 0.0 for x in (point.roots[0].real, point.roots[0].imag))
+        return float(point.p[0]), Root(re, im, target.order)
 
 
 def _find_crossings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]:
@@ -201,28 +207,25 @@ def _find_crossings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]
 
 def _find_meetings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]:
     """Multiple eigenvalues with one eigenvector, each with the greatest order that Newton steps confirm."""
-    for (y, s, errors), (_, next_s, _) in pairwise(zip(*vars(grid).values(), strict=True)):
-        gaps = np.abs(s[:, None] - s) + np.diag(np.full(len(s), np.inf))
-        other = gaps.argmin(axis=1)
-        means, squares = (s + s[other]) / 2, (s - s[other]) ** 2
-        near = np.argsort(np.abs(means[:, None] - next_s), axis=1)
-        change = (next_s[near[:, 0]] - next_s[near[:, 1]]) ** 2 - squares
+    is_complex, shifted = scan.family.is_complex, scan.evaluate(grid.values + _SHIFT * scan.step)
+    for y, s, errors, next_s in zip(*vars(grid).values(), shifted.s, strict=True):
+        slopes = (next_s[np.abs(s[:, None] - next_s).argmin(axis=1)] - s) / _SHIFT
+        gaps, means = s[:, None] - s, (s[:, None] + s) / 2
         with np.errstate(all="ignore"):
-            share = np.clip((-squares / change).real, 0, 1)
-        is_near = np.abs(squares + share * change) <= _MEETING * np.abs(change)
-        is_near &= np.abs(s - s[other]) > errors + errors[other]  # else they coincide for every value
-        is_near &= (other[other] != np.arange(len(s))) | (other > np.arange(len(s)))  # each pair once
-        if not scan.family.is_complex:
-            is_near &= means.imag >= 0
-        for mean, part in zip(means[is_near], share[is_near], strict=True):
-            is_real, nearest = mean.imag == 0 and not scan.family.is_complex, s[np.argsort(np.abs(s - mean))]
-            axis, start = "real" if is_real else "complex", y + part * scan.step
+            steps = -gaps / (2 * (slopes[:, None] - slopes))
+        is_near = (np.abs(steps - _MEETING_CENTRE) <= _MEETING_RADIUS) & (np.abs(gaps) > errors[:, None] + errors)
+        is_near &= np.tri(len(s), k=-1, dtype=bool) & (is_complex | (means.imag >= 0))
+        for mean, part in zip(means[is_near], steps[is_near].real, strict=True):
+            is_real, nearest = mean.imag == 0 and not is_complex, s[np.argsort(np.abs(s - mean))]
+            refine_first = partial(_refine_first, scan, "real" if is_real else "complex", y + part * scan.step, nearest)
+            if event := refine_first(_FIRST_ORDERS):
+                yield refine_first(_HIGHER_ORDERS) or event
 
-            def refine_first(*orders: int) -> tuple[float, Root] | None:
-                """The event of the first order that there is."""
-                targets = (Target(k, axis) for k in orders if k <= len(s))
-                steps = (scan.refine(t, start, complex(nearest[: t.order].mean()), _MAX_MOVE) for t in targets)
-                return next(filter(None, steps), None)
 
-            if event := refine_first(*_FIRST_ORDERS):
-                yield refine_first(*_HIGHER_ORDERS) or event
+def _refine_first(
+    scan: _Scan, axis: Axis, y: float, nearest: Complex, orders: Sequence[int]
+) -> tuple[float, Root] | None:
+    """The event of the first order that there is."""
+    targets = (Target(k, axis) for k in orders if k <= len(nearest))
+    steps = (scan.refine(t, y, complex(nearest[: t.order].mean()), _MAX_MOVE) for t in targets)
+    return next(filter(None, steps), None)

@@ -20,10 +20,11 @@ from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.models.expression import Expression, ExpressionError
 from tmsopt.models.model import ROOTS
 from tmsopt.models.stated.pairs import list_parts
+from tmsopt.models.user_spectrum import AXIS_TOLERANCE
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, regularise
-from tmsopt.records import AnyNumbers
-from tmsopt.roots import Conditioning, find_conditioning, find_motion, roots
+from tmsopt.records import AnyNumbers, Complex
+from tmsopt.roots import CLASSES, Conditioning, find_conditioning, find_motion, roots
 
 _MAX_ENTRIES = 2**18  # largest number of entries of the state matrices that are computed together: 4 MB for each array
 
@@ -52,7 +53,12 @@ class ArrayFunction:
             Name → value, in the shape of the columns that the expression depends on.
         """
         missing_names = {n for n in self.formula.inputs if n not in columns}
-        root_values = roots_of(coefficients_of(self.problem, columns), missing_names) if missing_names else {}
+        root_values = dict[str, Any]()
+        if missing_names and self.problem.model.polynomial is not None:
+            root_values = roots_of(coefficients_of(self.problem, columns), missing_names)
+        elif missing_names:
+            found = find_eigenvalues(self.problem.model, self.problem.parameter_set, columns)
+            root_values = describe_eigenvalues(found.eigenvalues, self.problem.model.is_complex)
         return dict(zip(self.names, evaluate_on_arrays(self.formula, {**columns, **root_values}), strict=True))
 
 
@@ -147,6 +153,33 @@ def find_eigenvalues(model: Model, parameter_set: ParameterSet, columns: AnyNumb
     ]
     arrays = zip(*(vars(block).values() for block in blocks), strict=True)
     return Conditioning(*(np.concatenate(parts).reshape(*shape, -1) for parts in arrays))
+
+
+def describe_eigenvalues(s: Complex, is_complex: bool) -> dict[str, Any]:
+    """Root quantities, class and number of real roots, as `Motion` and `Classes` define them, for eigenvalues.
+
+    A real part of at most `AXIS_TOLERANCE` of the largest eigenvalue counts as 0 for the class.
+
+    Args:
+        s: shape (…, number of eigenvalues); nan where undefined.
+        is_complex: whether the matrices are complex; then an eigenvalue has no partner, and 0 is no special frequency.
+    """
+    sizes, is_real = np.abs(s), (s.imag == 0) & (not is_complex)
+    ratios = np.divide(-s.real, sizes, out=np.zeros(s.shape), where=sizes != 0)
+    tolerance = AXIS_TOLERANCE * sizes.max(axis=-1, keepdims=True)
+    names = {
+        "heavily damped": (s.real < -tolerance).all(axis=-1) & is_real.all(axis=-1),
+        "stable": (s.real < -tolerance).all(axis=-1),
+        "capsize": (is_real & (s.real >= -tolerance)).any(axis=-1),
+        "weave": np.isfinite(s).all(axis=-1),
+    }
+    return {
+        "abscissa": s.real.max(axis=-1),
+        "damping_ratio": np.where(is_complex, np.nan, ratios.min(axis=-1)),
+        ANGULAR_FREQUENCY: np.abs(s.imag).max(axis=-1),
+        "kind": np.select([*names.values()], [CLASSES.index(n) for n in names]),
+        "real_roots": is_real.sum(axis=-1),
+    }
 
 
 @lru_cache(maxsize=64)

@@ -136,7 +136,8 @@ def _find_eigenvalues_exactly(model: Model, parameter_set: ParameterSet, paramet
         eigenvalues = flint.acb_mat(rows).eig(algorithm="approx")
         zero = _ZERO_EIGENVALUE * max(float(abs(z)) for row in rows for z in row)
         parts = ((float(z.real), float(z.imag)) for z in eigenvalues)
-        return [Root(*(x if abs(x) > zero else 0.0 for x in pair)) for pair in parts]
+        pairs = ([x if abs(x) > zero else 0.0 for x in pair] for pair in parts)
+        return [Root(re, im) for re, im in pairs]
 
 
 def _damping_ratio(values: AnyNumbers) -> float:

@@ -59,15 +59,16 @@ class Chain:
 
     @cached_property
     def unit(self) -> float:
-        """The unit u of t in which the first and the last vector of the chain, x₀ and x_j u^j, have the same length."""
-        first, *_, last = np.linalg.norm(self.right[[0, 0, -1]], axis=1)
-        growth = last / first
-        unit = float(growth ** (-1 / (self.order - 1))) if self.order > 1 and 0 < growth < np.inf else 1.0
-        if len(value := self.terms[0]) == 1 or len(self.terms) < 3:
-            return unit
-        # the last vector may vanish, as in an uncoupled oscillator
-        ratio = float(np.linalg.norm(value) / np.linalg.norm(self.terms[-1]))
-        return min(unit, ratio ** (1 / (len(self.terms) - 1))) or unit
+        """The unit u of t in which the first and the last vector of the chain, x₀ and x_j u^j, have the same length.
+
+        It is at most the size of the eigenvalues, because x_j may be 0 up to rounding if L has a degree above 1.
+        """
+        if self.order == 1:
+            return 1.0
+        growth = np.linalg.norm(self.right[-1]) / np.linalg.norm(self.right[0])
+        *others, leading = (np.linalg.norm(P) for P in self.terms)
+        size = max((P / leading) ** (1 / i) for i, P in enumerate(others[::-1], start=1)) or 1.0
+        return float(min(growth ** (-1 / (self.order - 1)) if growth > 0 else np.inf, size))
 
     @property
     def powers(self) -> Array:

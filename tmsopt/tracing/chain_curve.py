@@ -89,7 +89,7 @@ class ChainSetup:
             try:
                 others = eigenvalues_of(self.family.matrices(self.split(point)[0]))
             except np.linalg.LinAlgError:
-                others = np.full(self.problem.model.size, np.nan, dtype=complex)
+                others = np.full(self.problem.model.degree, np.nan, dtype=complex)
             row = list[complex]()
             for s, target, both in zip(roots.tolist(), self.targets, conjugates, strict=True):
                 for z in (s, s.conjugate()) if both else (s,):
