@@ -337,6 +337,11 @@ class Model:
         """Number of roots of the system as the user states it."""
         return self.degree // 2 if self.is_doubled else self.degree
 
+    @property
+    def noun(self) -> str:
+        """What reports call a set of parameters: a point of a complex H, otherwise a design."""
+        return "point" if self.is_complex else "design"
+
     def within(self, ranges: Mapping[str, tuple[float, float]]) -> "Model":
         """The model for parameters in given ranges: a complex H gets a carrier for them, other models stay the same."""
         return self if self.carried is None else self.carried(ranges)

@@ -391,15 +391,10 @@ def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str
     if real_part:
         words = "root has real part" if not problem.model.is_complex else "eigenfrequency has gain"
         return (f"not the edge of stability: another {words} {unit_of(problem, 'abscissa').show(real_part, 2)}",)
-    if unstable_note or not is_optimal or checked.structure.abscissa < 0:
+    is_sought = is_optimal and problem.free and minimizes_abscissa(problem)
+    if unstable_note or not is_sought or checked.structure.abscissa < 0:
         return unstable_note
     largest = max((r.size for r in checked.structure.roots), default=0.0)
     verdict = stability((checked.structure.abscissa, checked.abscissa_realised), edges, largest=largest)
-    if problem.free and minimizes_abscissa(problem):
-        edge_note = (
-            "no design that decays was found in the box; at abscissa 0, multiple roots decide whether motions grow"
-        )
-        return (
-            edge_note if verdict.on_edge else "no stable design was found in the box; this is the least unstable one",
-        )
-    return () if verdict.on_edge else ("the design is not stable: abscissa >= 0",)
+    edge_note = "no design that decays was found in the box; at abscissa 0, multiple roots decide whether motions grow"
+    return (edge_note if verdict.on_edge else "no stable design was found in the box; this is the least unstable one",)
