@@ -80,7 +80,7 @@ def locate_by_chains(
     found, start_count, end = list[_Found](), 0, None
     for start in chain([first], (_vector(problem, design) for design in further)):
         choice = rng if start_count % 2 else None  # every second start chooses freely which eigenvalues shall meet
-        point = find_point(family, targets, start, choice)
+        point = find_point(family, targets, start, choice, is_patient=start_count < _MIN_STARTS)
         start_count += 1
         end = end if point is None else np.clip(point.p, *family.box.T)
         if point is not None and point.is_found:
