@@ -152,8 +152,8 @@ def _find_nearby(problem: Posed, parameters: Numbers) -> NearbyPoint | None:
             x, y = vectors.T[np.argsort(np.abs(s - point.roots[0]))[:2]]
             overlap = np.vdot(x, y)
             angle = math.atan2(np.linalg.norm(y - overlap * x), abs(overlap))
-            tables = (Table(zip(names, q.tolist(), strict=True)) for q in (point.p, point.p - p))
-            points.append(NearbyPoint(*tables, float(np.linalg.norm((point.p - p) / widths)), angle))
+            there, changes = (Table(dict(zip(names, q.tolist(), strict=True))) for q in (point.p, point.p - p))
+            points.append(NearbyPoint(there, changes, float(np.linalg.norm((point.p - p) / widths)), angle))
     return min((q for q in points if q.distance <= _NEAR), key=lambda q: q.distance, default=None)
 
 
