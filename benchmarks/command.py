@@ -66,6 +66,7 @@ SECTIONS = (
     Section("p", "proofs", "benchmarks.reports.proofs", "exceptional points of the paper, proved", long=True),
     Section("p", "rescues", f"{_DESIGNS}.rescues", "problems that need each rescue of the search", long=True),
     Section("p", "matrices", f"{_SYSTEMS}.matrices", "exceptional points of 70 matrices of size 2 to 100", long=True),
+    Section("p", "pencils", f"{_SYSTEMS}.random_matrices", "random pencils and diabolic points", long=True),
     Section("q", "references", f"{_DESIGNS}.references", "the best values of the random designs, kept", long=True),
     Section("r", "known", f"{_SYSTEMS}.known", "the best values of the random systems, kept", long=True),
     Section("s", "hard", f"{_DESIGNS}.hard_designs", "hard problems: is optimal the best known", long=True),

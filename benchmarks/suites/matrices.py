@@ -131,7 +131,7 @@ def _defect(matrix: Any, system: System) -> tuple[float, float]:
             side = mp.matrix([*chain[:n, j], 0])
         x, f = chain[:n, :], chain[n, :].H
         square = (f.H * mp.lu_solve(x.H * x, f))[0]
-    except ZeroDivisionError:
+    except (ZeroDivisionError, TypeError):  # mpmath raises both if the matrix is exactly singular
         square = mp.inf
     return float(mp.sqrt(abs(square))) / system.size, float(values[-2]) / system.size
 

@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.optimize
 
 import tmsopt
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
@@ -117,3 +118,34 @@ def test_what_a_result_of_eigenvalues_can_do():
     frame = found.to_frame()
     assert list(frame["petermann"]) == [s.petermann for s in found.entries]
     assert "Petermann" in found.report()
+
+
+@pytest.mark.parametrize("change", [1e-2, 1e-6, -1e-6, -0.05])
+def test_the_nearest_EP2_of_two_modes_and_the_angle_of_their_eigenvectors(change):
+    """[[i g, 1], [1, −i g]] has its EP2 at g = 1, and |x₁* x₂| is 1/g for g > 1 and g for g < 1."""
+    g = 1 + change
+    found = eigenvalues(from_hamiltonian([["1j*g", 1], [1, "-1j*g"]]), g=g)
+    near = found.nearest_EP2
+    assert near.parameters["g"] == pytest.approx(1, abs=1e-14)
+    assert (near.changes["g"], near.distance) == pytest.approx((-change, abs(change) / g), rel=1e-7)
+    assert near.angle == pytest.approx(math.acos(min(g, 1 / g)), rel=1e-8)
+    assert found.to_json()["nearest_EP2"]["changes"] == near.changes
+    assert "nearest EP2 found: g = 1 " in str(found)
+
+
+def test_the_nearest_EP2_of_an_oscillator():
+    """s² + 2 d s + k has its EP2 at d² = k; of all such points the nearest in relative changes is found."""
+    near = eigenvalues(from_matrices(M=[[1]], D=[["2*d"]], K=[["k"]]), d=1.02, k=1.0).nearest_EP2
+    best = scipy.optimize.minimize_scalar(lambda d: math.hypot(d / 1.02 - 1, d * d - 1), (1.0, 1.02), tol=1e-12)
+    assert (near.parameters["d"], near.distance) == pytest.approx((best.x, best.fun), abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("H", "fixed"),
+    [
+        ([["a", "b - c"], ["b - c", 1]], {"a": 1 + 1e-6, "b": 1 + 1e-6, "c": 1.0}),  # a diabolic point is near
+        ([["1j*g", 1], [1, "-1j*g"]], {"g": 1.5}),  # 50 % away
+    ],
+)
+def test_where_no_EP2_is_near(H, fixed):
+    assert eigenvalues(from_hamiltonian(H), **fixed).nearest_EP2 is None

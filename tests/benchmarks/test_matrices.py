@@ -2,13 +2,15 @@
 
 import ast
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import mpmath as mp
+import numpy as np
 import pytest
 
 from benchmarks.reports.systems.matrices import Row
-from benchmarks.suites import matrices
+from benchmarks.suites import matrices, random_matrices
 
 SYSTEMS = {s.name: s for s in matrices.systems()}
 SOME = ["spin, 6", "gain and loss at the ends, 21", "gain and loss in halves, 4", "weak link, 20", "impurity, 20"]
@@ -92,3 +94,27 @@ def test_the_truth_is_independent():
         text = Path(matrices.__file__).parent.joinpath(module).read_text(encoding="utf-8")
         imported = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Import | ast.ImportFrom)]
         assert not [n for n in imported if "tmsopt" in ast.unparse(n)]
+
+
+@pytest.mark.parametrize("number", [0, 100, 170])
+def test_a_pencil_has_its_double_eigenvalues_at_the_zeros_of_its_discriminant(number):
+    pencil = random_matrices.make_pencil(number, 7)
+    n = len(pencil.entries)
+    assert len(pencil.zeros) == n * (n - 1)
+    for z in pencil.zeros:
+        H = [[eval(entry, {"x": z.real, "y": z.imag}) for entry in row] for row in pencil.entries]
+        s = np.linalg.eigvals(H)
+        assert min(abs(a - b) for a, b in combinations(s, 2)) < 1e-6
+
+
+@pytest.mark.parametrize("number", [0, 1, 6, 7])
+def test_a_crossing_has_two_eigenvectors_and_its_neighbours_have_one(number):
+    (point,) = (system := random_matrices.make_crossing(number, 7)).known
+    assert matrices.judge(system, point[:-1], point[-1]).second < 1e-13
+    near = random_matrices.make_crossing(number, 7, random_matrices.GAP)
+    for *parameters, eigenvalue in near.known:
+        verdict = matrices.judge(near, parameters, eigenvalue)
+        assert verdict.backward < 1e-13
+        assert verdict.second > 1e-10
+        distances = [parameters[k] - point[k] for k in (0, 1)]
+        assert float(mp.hypot(*distances)) == pytest.approx(random_matrices.GAP, rel=1e-9)

@@ -207,3 +207,20 @@ def test_an_exceptional_point_beside_a_diabolic_one_is_told_apart():
     assert abs(abs(found.parameters["g"]) - 1e-6) <= 1e-20
     assert found.to_json()["geometric_multiplicity"] == 1
     assert math.isclose(found.abscissa, 0.0, abs_tol=1e-12)
+
+
+@pytest.mark.parametrize("start", [(-0.3, 0.2), (0.4, 0.35)])
+def test_an_exceptional_point_next_to_a_diabolic_one(start):
+    """(u + i g c) σ₁ + (v + i g s) σ₃ has its EP2 at ±g (−s, c), a distance g from a diabolic point for g = 0."""
+    g, c, s = 1e-6, 0.6, 0.8
+    B = [[f"v + {g * s!r}j", f"u + {g * c!r}j"], [f"u + {g * c!r}j", f"-v - {g * s!r}j"]]
+    S, inverse = [[1, 0], [7, 1]], [[1, 0], [-7, 1]]  # a similarity, because normal matrices are easier
+    H = [
+        [" + ".join(f"({S[i][k] * inverse[m][j]})*({B[k][m]})" for k in (0, 1) for m in (0, 1)) for j in (0, 1)]
+        for i in (0, 1)
+    ]
+    problem = tmsopt.Problem(from_hamiltonian(H), free={"u": (-0.5, 0.5), "v": (-0.5, 0.5)}, locate="EP2").posed
+    point = find_point(family_of(problem), targets_of("EP2", is_complex=True), np.array(start))
+    assert point.is_found
+    assert np.abs(point.p) == pytest.approx((g * s, g * c), rel=1e-6)
+    assert point.p[0] * point.p[1] < 0

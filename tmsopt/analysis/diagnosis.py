@@ -162,6 +162,8 @@ def diagnose_roots(
             stored_chains = find_chains(stored_point)
             point = refine_point(stored_point, stored_chains.geometric if stored_chains else 1)
             refined_chains, g = find_chains(point), point.geometric
+            if refined_chains and refined_chains.zero > refined_chains.threshold:
+                continue  # coefficients of a high degree do not separate some simple roots; the matrices do
             chains = (
                 refined_chains
                 if stored_chains and refined_chains and refined_chains.geometric == stored_chains.geometric

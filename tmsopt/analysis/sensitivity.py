@@ -1,22 +1,28 @@
-"""How sensitive each eigenvalue of a design is: phase rigidity, Petermann factor and condition number."""
+"""How sensitive each eigenvalue of a design is: phase rigidity, Petermann factor, and the nearest EP2."""
 
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from tmsopt.chains import family_of, find_point, targets_of
 from tmsopt.models.user_spectrum import eigenfrequencies
 from tmsopt.problem.evaluate import evaluate_matrices
 from tmsopt.problem.files import ProblemSource
-from tmsopt.problem.problem import Problem
+from tmsopt.problem.problem import Posed, Problem
 from tmsopt.progress import Listener
-from tmsopt.records import Complex, Tabular, plain
+from tmsopt.records import Complex, Numbers, Table, Tabular, plain
 from tmsopt.roots import Root, condition_eigenvalue
+from tmsopt.roots.chains import linearise
 from tmsopt.search.solve import solve_if_needed
 
 _NAMES = "phase_rigidity petermann condition"  # names of the sensitivities, in JSON too
 _DIGITS = 9  # digits of sensitivities in JSON; rounding errors grow with the condition number
 _SAME_ROOT = 1e-9  # distance between a root and the same root in a list of multiple roots, divided by the largest root
+_NEAR = 0.1  # an EP2 is near if the relative changes that lead to it are at most this
+_ROUNDED_ZERO = 1e-9  # a value below this share of its range may be a rounded 0
 
 
 @dataclass(frozen=True)
@@ -38,6 +44,23 @@ class Eigenvalue(Root):
         return plain(self, f"re im multiplicity{omega}") | sensitivity_to_json(self)
 
 
+@dataclass(frozen=True)
+class NearbyPoint:
+    """A point near a design at which two of its eigenvalues coincide with one eigenvector.
+
+    Attributes:
+        parameters, changes: the free parameters there, or all parameters if none is free; their changes.
+        distance: root of the sum of squares of the relative changes. For a parameter that is 0, the change is divided
+            by its range, or by 1 if it is fixed.
+        angle: between the eigenvectors z of the two eigenvalues at the design, in radians, from 0 to π/2.
+    """
+
+    parameters: Table[float]
+    changes: Table[float]
+    distance: float
+    angle: float
+
+
 @dataclass(frozen=True, repr=False)
 class Eigenvalues(Tabular):
     """All eigenvalues of a design with their sensitivities.
@@ -52,6 +75,7 @@ class Eigenvalues(Tabular):
         entries: the eigenvalues in the order of the roots of the solution. A defective eigenvalue has phase rigidity 0
             and infinite Petermann factor and condition number. A semisimple eigenvalue has one phase rigidity,
             1/‖Π‖ with the projector Π onto its eigenvectors. Without matrices, the companion matrix counts.
+        nearest_EP2: the nearest EP2 that was found, if all eigenvalues are simple and it is within 10 %; else None.
 
     Example:
         >>> found = tmsopt.eigenvalues("problems/ep4.toml")  # four roots coincide
@@ -63,6 +87,7 @@ class Eigenvalues(Tabular):
 
     problem: Problem
     entries: tuple[Eigenvalue, ...]
+    nearest_EP2: NearbyPoint | None = None
 
     def records(self) -> Iterable[Mapping[str, Any]]:
         """One row for each eigenvalue."""
@@ -70,7 +95,7 @@ class Eigenvalues(Tabular):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for ``json.dumps``; infinite numbers are None."""
-        return {"eigenvalues": [entry.to_json() for entry in self.entries]}
+        return plain({"eigenvalues": self.entries}) | plain(self, "nearest_EP2")
 
 
 def eigenvalues(design: ProblemSource, *, progress: Listener | None = None) -> Eigenvalues:
@@ -104,7 +129,32 @@ def eigenvalues(design: ProblemSource, *, progress: Listener | None = None) -> E
     entries = (
         Eigenvalue(r.re, r.im, r.multiplicity, **measure(r), eigenfrequency=next(frequencies, None)) for r in roots
     )
-    return Eigenvalues(solution.problem, tuple(entries))
+    is_simple = all(root.multiplicity == 1 for root in roots)
+    return Eigenvalues(solution.problem, tuple(entries), _find_nearby(problem, parameters) if is_simple else None)
+
+
+def _find_nearby(problem: Posed, parameters: Numbers) -> NearbyPoint | None:
+    """The nearest EP2, from the two eigenvalues that are nearest each other; None if there is none near the design."""
+    if problem.model.pencil is None:
+        return None
+    names = [*problem.free] or [*parameters]
+    p, box = (np.array([x[n] for n in names]) for x in (parameters, dict.fromkeys(names, (0, 0)) | dict(problem.free)))
+    widths = np.ptp(box, axis=1)
+    widths = np.where(np.abs(p) > _ROUNDED_ZERO * widths, np.abs(p), widths + (widths == 0))
+    box = p[:, None] + _NEAR * widths[:, None] * [-1, 1]
+    fixed = {n: x for n, x in parameters.items() if n not in names}
+    family = family_of(problem.derive(fixed=fixed, free=dict(zip(names, map(tuple, box), strict=True))))
+    is_complex, points = family.is_complex, list[NearbyPoint]()
+    for name in ("EP2",) if is_complex else ("EP2", "CEP2"):
+        point = find_point(family, targets_of(name, is_complex), p)
+        if point and point.is_found:
+            s, vectors = np.linalg.eig(linearise(family.matrices(p)))
+            x, y = vectors.T[np.argsort(np.abs(s - point.roots[0]))[:2]]
+            overlap = np.vdot(x, y)
+            angle = math.atan2(np.linalg.norm(y - overlap * x), abs(overlap))
+            there, changes = (Table(dict(zip(names, q.tolist(), strict=True))) for q in (point.p, point.p - p))
+            points.append(NearbyPoint(there, changes, float(np.linalg.norm((point.p - p) / widths)), angle))
+    return min((q for q in points if q.distance <= _NEAR), key=lambda q: q.distance, default=None)
 
 
 def measure_sensitivity(matrices: Complex, s: complex, multiplicity: int, is_defective: bool) -> dict[str, float]:

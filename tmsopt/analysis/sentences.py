@@ -52,7 +52,7 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
         count = solution.freedom.count
         family = {1: "a curve", 2: "a surface"}.get(count, f"a {count}-parameter family")
         trace = ", which tmsopt trace follows" if count == 1 else ""
-        family_text = f"; it belongs to {family} of such designs{trace}" if count > 0 else ""
+        family_text = f"; it belongs to {family} of such {problem.model.noun}s{trace}" if count > 0 else ""
         return f"tmsopt prove FILE tries to prove that this point exists exactly{family_text}"
     if bound.proven:
         return f"{no_design(problem)} {describe_better(solution, text)} (method {bound.method})"

@@ -51,7 +51,7 @@ def list_warnings(solution: Solution) -> tuple[str, ...]:
 
 def no_design(problem: Posed) -> str:
     """The subject of a sentence that excludes the designs of a problem."""
-    return f"no design{f' with {problem.locate}' if problem.locate else ''} within the limits"
+    return f"no {problem.model.noun}{f' with {problem.locate}' if problem.locate else ''} within the limits"
 
 
 def state_bound(problem: Posed, bound: Bound, unit: Unit = _NO_UNIT, digits: int = 6) -> str:
@@ -77,7 +77,7 @@ def _describe_quality(solution: Solution) -> str:
     if not goal:
         count = solution.freedom.count
         surplus = f"; {count} more parameters are free than the pattern needs" if count > 0 else ""
-        return f"a design with {problem.locate}, as asked{surplus}"
+        return f"a {problem.model.noun} with {problem.locate}, as asked{surplus}"
     if bound.proven:
         return f"{no_design(problem)} {describe_better(solution, goal)} (proved)"
     origin, doubt = solution.starts.sureness[:1], solution.starts.sureness[1:]

@@ -34,7 +34,9 @@ MAX_BACKWARD_ERROR = 1e-12
 """Largest relative change of the matrices that makes the chain of a found design exact."""
 
 _MAX_CLUSTER_STEPS = 60
-_CLOSE = 1e-3  # a spread below this share of the size of the eigenvalues ends the first stage
+_CLOSE = 1e-3, 1e-8
+"""A spread below this share of the size of the eigenvalues ends the first stage; the smaller one if the second stage
+then fails, as it does for an EP next to a diabolic point."""
 _MIN_DAMPING = 1e-3
 _DECREASE = 0.1  # share of the predicted decrease that a damped step must reach
 _MAX_CHAIN_STEPS = 60
@@ -140,27 +142,35 @@ def find_point(
     targets: Sequence[Target],
     start: Array,
     rng: np.random.Generator | None = None,
+    *,
     is_nearest: bool = True,
+    is_patient: bool = True,
 ) -> ExceptionalPoint | None:
     """The point that the two stages reach from a design; None if they fail.
 
     Args:
         rng: chooses which eigenvalues shall coincide; by default those that are nearest each other.
         is_nearest: if the conditions leave freedom, find the nearest point, which takes more steps.
+        is_patient: whether a second attempt brings the eigenvalues closer, as an EP next to a diabolic point needs.
     """
     with np.errstate(all="ignore"):
-        try:
-            state = _gather(family, targets, np.clip(start, *family.box.T), rng)
-        except np.linalg.LinAlgError:
-            return None
-        if state is None:
-            return None
-        try:
-            point = refine(family, targets, state.p, state.means, start if is_nearest else None, state.steps)
-            return point if point.is_found else replace(point, p=state.p)
-        except np.linalg.LinAlgError:  # an eigenvalue has several eigenvectors there
-            unknown = np.full(len(state.p), np.inf)
-            return ExceptionalPoint(state.p, (), np.inf, 0.0, unknown, (state.steps, 0))
+        p, point = np.clip(start, *family.box.T), None
+        for close in _CLOSE if is_patient else _CLOSE[:1]:
+            try:
+                state = _gather(family, targets, p, rng if point is None else None, close)
+            except np.linalg.LinAlgError:
+                return point
+            if state is None:
+                return point
+            p = state.p
+            try:
+                point = refine(family, targets, p, state.means, start if is_nearest else None, state.steps)
+            except np.linalg.LinAlgError:  # an eigenvalue has several eigenvectors there
+                point = ExceptionalPoint(p, (), np.inf, 0.0, np.full(len(p), np.inf), (state.steps, 0))
+            if point.is_found:
+                break
+            point = replace(point, p=p)
+        return point
 
 
 def refine_near(family: Family, targets: Sequence[Target], p: Array) -> ExceptionalPoint | None:
@@ -204,7 +214,7 @@ class _Gathered:
 
 
 def _gather(
-    family: Family, targets: Sequence[Target], start: Array, rng: np.random.Generator | None
+    family: Family, targets: Sequence[Target], start: Array, rng: np.random.Generator | None, close: float
 ) -> _Gathered | None:
     """Bring the eigenvalues of each target together, by damped Gauss–Newton steps in the box."""
     spectrum = _Spectrum(family, start)
@@ -212,7 +222,7 @@ def _gather(
     size = float(np.abs(s - s.mean()).max() or np.abs(s).max()) or 1.0
     state = _measure(spectrum, targets, _choose_groups(s, targets, family, rng), size)
     while state and state.steps < _MAX_CLUSTER_STEPS:
-        if state.largest_distance(targets) <= _CLOSE * size:
+        if state.largest_distance(targets) <= close * size:
             break
         step, damping = _step_in_box(state.jacobian, state.residual, state.p, family), 1.0
         while damping > _MIN_DAMPING:

@@ -58,7 +58,7 @@ def write_explanation(explanation: Explanation, _level: Level) -> Parts:
         yield f"rounding {explanation.worst} alone to {SINGLE_DIGITS} digits has the largest effect"
 
 
-def describe_rounding(explanation: Explanation) -> str:
+def describe_rounding(explanation: Explanation, noun: str = "design") -> str:
     """Describe the fewest digits that suffice, the effect of fewer digits, and the parameter that needs most digits.
 
     Digits suffice if the rounded design is stable, meets all limits, and loses at most 5 % in decay and objective.
@@ -74,11 +74,11 @@ def describe_rounding(explanation: Explanation) -> str:
     if is_stable and few_digits and not few_digits.realised < 0:
         single_row, becomes_unstable = explanation.rounding.get(explanation.worst), True
         cause = f" ({explanation.worst} alone: {single_row.written[explanation.worst]})" if single_row else ""
-        parts.append(f"with {SINGLE_DIGITS} digits the design is unstable{cause}")
+        parts.append(f"with {SINGLE_DIGITS} digits the {noun} is unstable{cause}")
     elif is_stable and few_digits and (fewest_digits is None or fewest_digits.digits > SINGLE_DIGITS):
-        parts.append(f"with {SINGLE_DIGITS} digits the design {_describe_effect(few_digits, explanation)}")
+        parts.append(f"with {SINGLE_DIGITS} digits the {noun} {_describe_effect(few_digits, explanation)}")
     row = fewest_digits or rows[-1]
-    parts.append(f"with {row.digits} digits {'it' if parts else 'the design'} {_describe_effect(row, explanation)}")
+    parts.append(f"with {row.digits} digits {'it' if parts else f'the {noun}'} {_describe_effect(row, explanation)}")
     needs = f"; {explanation.worst} needs the most digits" if explanation.worst and not becomes_unstable else ""
     return f"{'; '.join(parts)}{needs}"
 

@@ -26,6 +26,7 @@ from tmsopt.documents.solution import write_bicycle, write_growth_picture
 from tmsopt.documents.tables import write_question
 from tmsopt.global_search import Completeness
 from tmsopt.global_search.chain_equations import has_chain_proof
+from tmsopt.models import Model
 from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem import unit_at
 from tmsopt.problem.problem import Posed
@@ -62,7 +63,7 @@ def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None)
     if rows := list_numbers(problem, proof):
         yield Chapter("digits", width="wide")
         if proof.stored and proof.reason:
-            yield "the stored design:"
+            yield f"the stored {problem.model.noun}:"
         head = ("number", "decimal", "radius", "unit")
         yield TableBlock((head, *rows), f"Numbers that were proved, to {proof.digits} digits", priorities=(9, 8, 5, 6))
     if level == "page":
@@ -71,7 +72,7 @@ def write_proof(proof: Proof, level: Level, *, design: "Solution | None" = None)
     yield Chapter("method")
     yield from _describe_method(problem, proof)
     yield Chapter("facts")
-    yield from _write_facts(proof)
+    yield from _write_facts(proof, problem.model)
     yield Chapter("exact", "Exact numbers")
     yield from _write_exact_numbers(problem, proof)
     if level == "page" and design is not None:
@@ -102,7 +103,7 @@ def _find_numbers(problem: Posed, proof: Proof) -> Iterator[tuple[str, Number, s
         if not _FACTOR_COEFFICIENT.fullmatch(name):
             yield name, x, units.get(name, "")
     if proof.abscissa:
-        yield "abscissa", proof.abscissa, rate_unit
+        yield "largest Im ω" if problem.model.is_complex else "abscissa", proof.abscissa, rate_unit
     for omega in proof.eigenfrequencies:
         yield f"eigenfrequency{format_multiplicity(omega.multiplicity)}, re", omega.re, ""
         yield "  im", omega.im, ""
@@ -130,10 +131,11 @@ def _find_units(problem: Posed, proof: Proof) -> dict[str, str]:
 
 def _describe_method(problem: Posed, proof: Proof) -> Parts:
     """Describe the method of the proof, the error of the stored design, and the region without another solution."""
+    noun = problem.model.noun
     if proof.method == "exact factorisation":
         yield Sentence("square-free factorisation of the polynomial, whose coefficients are fractions", "method")
     elif not proof.moved and proof.method != "Krawczyk":
-        yield Sentence("roots of the stored design, isolated by interval arithmetic", "method")
+        yield Sentence(f"roots of the stored {noun}, isolated by interval arithmetic", "method")
     else:
         has_constraints = len(proof.unknowns) + len(proof.moved) > problem.model.degree
         equations = "a_k = a0 c_k" + (" and the == constraints" if has_constraints else "")
@@ -142,18 +144,18 @@ def _describe_method(problem: Posed, proof: Proof) -> Parts:
             equations = "of the Jordan chain"
         yield Sentence(f"Krawczyk's interval Newton test on the equations {equations}", "method")
         error, distance = round_one_way(proof.radius, True, 2), round_one_way(proof.uniqueness, False, 2)
-        uniqueness = f"every other such design differs in some number by more than {distance:.2g}"
+        uniqueness = f"every other such {noun} differs in some number by more than {distance:.2g}"
         yield f"error at most {error:.1e} before rounding to these digits; {uniqueness}"
         rounding_text = f"rounding alone can cause a difference of {proof.explained:.1e}"
-        yield f"the stored design differs from the proved one by {proof.distance:.1e}; {rounding_text}"
+        yield f"the stored {noun} differs from the proved one by {proof.distance:.1e}; {rounding_text}"
 
 
-def _write_facts(proof: Proof) -> Parts:
-    suffix = " (of the stored design)" if proof.stored and proof.reason else ""
+def _write_facts(proof: Proof, model: Model) -> Parts:
+    suffix = f" (of the stored {model.noun})" if proof.stored and proof.reason else ""
     shows_defect = "EP" in proof.pattern and proof.defective != NOT_CHECKED
     if shows_defect or proof.geometric_multiplicity is not None:
         yield _write_fact(f"defective{suffix}", proof.defective)
-    yield _write_fact(f"stable{suffix}", proof.stable)
+    yield _write_fact(f"{'decaying' if model.is_complex else 'stable'}{suffix}", proof.stable)
     if not proof.eigenfrequencies:
         yield _write_fact(f"heavily damped{suffix}", proof.heavily_damped)
     yield _write_fact("within the ranges", proof.inside)
@@ -189,13 +191,13 @@ def write_every(result: Every, _level: Level) -> Parts:
     solutions, coverage, proof = result.solutions, result.coverage, result.completeness
     is_complete = proof is not None and proof.complete
     verdict = Badge("proved to be all", "good") if is_complete else "not proved to be all"
-    yield count_things(solutions, "design"), verdict
+    yield count_things(solutions, "solution"), verdict
     effort = f"{proof.boxes} boxes, {proof.seconds:.2g} s" if proof else ""
     if proof and proof.total is not None:
         effort = f"the discriminant has {proof.total} zeros, each one proved, {proof.seconds:.2g} s"
     if not solutions:
-        no_design = f"no design within the ranges and limits has the pattern (proved; {effort})"
-        yield Sentence(no_design if is_complete else "no isolated solution was found", tone="answer")
+        no_solution = f"no parameters within the ranges and limits have the pattern (proved; {effort})"
+        yield Sentence(no_solution if is_complete else "no isolated solution was found", tone="answer")
     else:
         count_text = f"{count_things(solutions, 'solution')} within the ranges"
         count_text += f", no other exists (proved; {effort})" if is_complete else ""
@@ -209,11 +211,11 @@ def write_every(result: Every, _level: Level) -> Parts:
 
 def _list_designs(result: Every, is_complete: bool) -> list[Row]:
     """List the designs as columns: parameters, abscissa, structure, and how many starts reached each design."""
-    solutions, problem = result.solutions, result.solutions[0].problem
+    solutions, problem = result.solutions, result.solutions[0].problem.posed
     names = [n for n in solutions[0].parameters if n in problem.free]
     pairs = [*zip(solutions, result.errors or [{} for _ in solutions], strict=True)]
-    units = [unit_at(problem.posed, "abscissa", s.parameters) for s in solutions]
-    rows: list[Row] = [("design", *(str(k) for k in range(1, len(solutions) + 1)))]
+    units = [unit_at(problem, "abscissa", s.parameters) for s in solutions]
+    rows: list[Row] = [(problem.model.noun, *(str(k) for k in range(1, len(solutions) + 1)))]
     rows += [(n, *(Cell(s.parameters[n], error=e.get(n, 0.0)) for s, e in pairs)) for n in names]
     abscissas = [Cell(s.abscissa, u, error=e.get("abscissa", 0.0)) for (s, e), u in zip(pairs, units, strict=True)]
     rows += [(f"abscissa {units[0].text}".rstrip(), *abscissas), ("structure", *(s.structure for s in solutions))]

@@ -40,20 +40,23 @@ def describe_robustness(robustness: Robustness, on_edge: bool = False) -> str:
     Args:
         on_edge: whether the ideal design is on the edge of stability; its rounded numbers may lie next to the edge.
     """
+    is_complex = robustness.problem.model.is_complex
+    threshold = f"none: the {robustness.problem.model.noun} is on the edge of stability"
     if robustness.edges:
-        edge = _EDGE if not robustness.problem.model.is_complex else _EDGE_OF_H
+        edge = _EDGE_OF_H if is_complex else _EDGE
         edge_names = " and ".join(edge[kind] for kind in robustness.edges)
         if robustness.zeros:
             zeros = ", ".join(f"{n} = 0" for n in robustness.zeros)
-            return f"none: the design is on the edge of stability, because {zeros} ({edge_names})"
-        return f"none: the design is on the edge of stability, with {edge_names}"
+            return f"{threshold}, because {zeros} ({edge_names})"
+        return f"{threshold}, with {edge_names}"
     if on_edge:
-        return "none: the design is on the edge of stability, up to rounding errors"
+        return f"{threshold}, up to rounding errors"
+    unstable = "with gain" if is_complex else "not stable"
     limit, new_state = robustness.limit, "unstable" if robustness.stable else "stable"
     if not limit.found:
-        return f"{'' if robustness.stable else 'not stable; '}the search found no change that makes it {new_state}"
+        return f"{'' if robustness.stable else f'{unstable}; '}the search found no change that makes it {new_state}"
     if not robustness.stable:
-        return f"not stable; {_describe_size(robustness)}{_name_largest(limit)} makes it stable"
+        return f"{unstable}; {_describe_size(robustness)}{_name_largest(limit)} makes it stable"
     cause = words_of(robustness.problem.model).get(limit.kind, "a root at infinity, a0 = 0")
     return f"{_describe_size(robustness)}{_name_largest(limit)} makes it unstable ({cause})"
 

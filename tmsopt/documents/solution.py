@@ -324,7 +324,7 @@ def _write_robustness(solution: Solution, explanation: Explanation | None, brief
         if full:
             yield from tabulate_boundaries(robustness)
     if explanation is not None and explanation.precision:
-        yield Sentence(describe_rounding(explanation), "rounding")
+        yield Sentence(describe_rounding(explanation, solution.problem.posed.model.noun), "rounding")
         if not brief:
             yield tabulate_rounding(explanation)
     if not brief:
@@ -336,7 +336,9 @@ def _write_search(solution: Solution) -> Parts:
     freedom, starts = solution.freedom, solution.starts
     if solution.problem.locate:
         parameters = count_things(freedom.free, "free parameter")
-        yield Sentence(f"{freedom.kind}, {parameters} and {count_things(freedom.conditions, 'condition')}", "freedom")
+        count = count_things(freedom.conditions, "parameter suffices", "parameters suffice")
+        needed = f": {count}" if freedom.by_symmetry else ""
+        yield Sentence(f"{freedom.kind}, {parameters}; {freedom.describe_conditions()}{needed}", "freedom")
     yield from list_branches(solution)
     if starts.tried:
         skipped_count = starts.tried - starts.runs

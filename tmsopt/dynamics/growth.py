@@ -186,15 +186,7 @@ def growth(
     grid = np.unique(np.concatenate([np.linspace(grid_start, high, count), *(c + offsets for c in centres)]))
     values = grid[(grid > low if is_speed else grid >= low) & (grid <= high)]
 
-    if model.polynomial is not None:
-        c = coefficients(values)
-        is_finite = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)  # leave out poles and roots at infinity
-        values, c = values[is_finite], c[is_finite]
-        root_values = roots(c)
-    else:
-        root_values = np.sort(find_eigenvalues(model, parameter_set, {**parameters, name: values}).eigenvalues)
-        is_finite = np.isfinite(root_values).all(axis=1)
-        values, root_values = values[is_finite], root_values[is_finite]
+    values, root_values, c = _find_roots(model, parameter_set, {**parameters, name: values}, values, coefficients)
     if is_polynomial:
         stable, heavily_damped = (
             _clip_bands(bands, low, high) for bands in (crossings.stable, crossings.heavily_damped)
@@ -203,19 +195,12 @@ def growth(
         is_inside = is_stable(c)
         stable = tuple(_find_runs(values, is_inside, events))
         heavily_damped = tuple(_find_runs(values, is_inside & np.all(root_values.imag == 0, axis=-1), ()))
-    rate = (
-        None
-        if parameter_set.rate is None
-        else np.zeros(values.shape) + parameter_set.rate({**parameters, name: values})
-    )
-    multiple_meetings = [c.at for c in events if _has_many_roots(c.kind)] + [design_value] * _has_many_roots(
-        design.structure
-    )
+    meetings = [(c.kind, c.at) for c in events] + [(design.structure, design_value)]
     modes = follow_modes(
         values,
         root_values,
         design_value,
-        multiple_meetings,
+        [at for kind, at in meetings if _has_many_roots(kind)],
         is_bicycle=is_bicycle(model) and model.degree == _BICYCLE_DEGREE,
         over_speed=is_speed,
         is_complex=model.is_complex,
@@ -234,10 +219,27 @@ def growth(
         design.problem,
         modes,
         events,
-        rate,
+        parameter_set.rate and np.zeros(values.shape) + parameter_set.rate({**parameters, name: values}),
         tuple(r for r in design.roots if r.multiplicity > 1),
         _find_petermann(model, parameter_set, {**parameters, name: values}, root_values) if petermann else None,
     )
+
+
+def _find_roots(
+    model: Model,
+    parameter_set: ParameterSet,
+    columns: AnyNumbers,
+    values: Array,
+    coefficients: Callable[[Array], Array],
+) -> tuple[Array, Complex, Array]:
+    """The values without poles and roots at infinity, their roots, and their coefficients if the model has them."""
+    if model.polynomial is None:
+        root_values = np.sort(find_eigenvalues(model, parameter_set, columns).eigenvalues)
+        is_finite = np.isfinite(root_values).all(axis=1)
+        return values[is_finite], root_values[is_finite], np.empty(0)
+    c = coefficients(values)
+    is_finite = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)
+    return values[is_finite], roots(c[is_finite]), c[is_finite]
 
 
 def _find_petermann(model: Model, parameter_set: ParameterSet, columns: AnyNumbers, roots: Complex) -> Array:

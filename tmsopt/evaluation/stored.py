@@ -152,7 +152,8 @@ def abscissa_as_stored(solution: Solution) -> str:
     design = solution.worst.applied(solution.parameters) if solution.worst else solution.parameters
     problem = solution.problem.posed
     unit = unit_at(problem, "abscissa", design)
-    prefix = "" if problem.goal == "abscissa" else f"abscissa {unit.show(ideal, _SHOWN_DIGITS)}, "
+    name = "largest Im ω" if problem.model.is_complex else "abscissa"
+    prefix = "" if problem.goal == "abscissa" else f"{name} {unit.show(ideal, _SHOWN_DIGITS)}, "
     return f"{prefix}{unit.number(realised, _SHOWN_DIGITS)} in double precision"
 
 

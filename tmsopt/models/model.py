@@ -322,6 +322,11 @@ class Model:
             formulas[parameter_set.name] = formula(outputs, parameter_set.names)
         return formulas
 
+    @property
+    def noun(self) -> str:
+        """What reports call a set of parameters: a point of a complex H, otherwise a design."""
+        return "point" if self.is_complex else "design"
+
     def _repr_latex_(self) -> str | None:
         """The characteristic polynomial in the native parameters; None if it is too long."""
         from tmsopt.models.typeset import LATEX, Typeset, polynomial_text

@@ -71,7 +71,7 @@ def _spell_call(name: str) -> Callable[..., str]:
 def number_text(x: Constant) -> str:
     """A constant with every digit: a fraction as a decimal if a double holds it, such as 0.1; √2 as ``sqrt(2)``."""
     if isinstance(x, Formula):
-        return fold(x, {}, Kind(_SPELLINGS, number_text))[0].removeprefix("(").removesuffix(")")  # type: ignore[no-any-return]
+        return re.sub(r"^\((.*)\)$", r"\1", fold(x, {}, Kind(_SPELLINGS, number_text))[0])
     double = repr(float(as_double(x))).removesuffix(".0")
     return double if isinstance(x, float) or Fraction(double) == x else str(x)
 

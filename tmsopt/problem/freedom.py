@@ -51,6 +51,12 @@ class Freedom:
         """``square``, ``under-determined`` or ``over-determined``."""
         return "square" if self.count == 0 else "under-determined" if self.count > 0 else "over-determined"
 
+    def describe_conditions(self) -> str:
+        """All conditions in words, with the number of those that hold by symmetry."""
+        total = self.conditions + self.by_symmetry
+        symmetry = f", {self.by_symmetry} by symmetry" if self.by_symmetry else ""
+        return f"{total} condition{'s' * (total != 1)}{symmetry}"
+
 
 def degrees_of_freedom(problem: Posed) -> Freedom:
     """Count free parameters, pattern conditions and equality constraints of a problem."""

@@ -25,7 +25,8 @@ def formulate_chains(problem: Posed, targets: Sequence[Target], point: Exception
     """
     build, x = Builder(problem, ()), [*point.p]
     *_, parameters = build.values[0].given
-    assert problem.model.pencil is not None and problem.pattern is not None
+    assert problem.model.pencil is not None
+    assert problem.pattern is not None
     pencil = [np.array(P, dtype=object) for P in problem.model.pencil(problem.parameter_set.native(parameters))]
     for target, chain in zip(targets, point.chains, strict=True):
         x += _add_chain(build, problem.pattern.name, target, chain, pencil)

@@ -188,10 +188,10 @@ def prove(
     problem = solution.problem.posed
     if solution.status != "optimal":
         crossings = [describe_crossing(m) for m in solution.meetings if not m.exceptional]
-        reason = f"the problem is not solved ({solution.status}): there is no design to prove"
+        reason = f"the problem is not solved ({solution.status}): there is no {problem.model.noun} to prove"
         if problem.pattern and crossings:
             reason = f"none found: the roots meet in {crossings[0]}"
-        claim = f"a design of '{problem.title or 'the problem'}' exists"
+        claim = f"a {problem.model.noun} of '{problem.title or 'the problem'}' exists"
         return Proof(claim, False, reason, digits=digits, problem=problem.problem)
     begin(solve_options.progress, f"proving to {digits} digits")
     structure, roots = solution.structure, solution.roots
@@ -261,7 +261,7 @@ def _prove_first(
     stored_design = enclose_stored(problem, design)
     if stored_design is None:
         reason = reasons[0] if reasons else "a0 may be 0: a root may be at infinity"
-        return Proof(_state_claim(name, expected_pattern), False, reason, name, digits=digits)
+        return Proof(_state_claim(name, expected_pattern, problem.model.noun), False, reason, name, digits=digits)
     reasons = reasons or _simple_doubts(problem, structure, stored_design)
     return _assemble(problem, design, name, expected_pattern, stored_design, digits, reasons, stored=True)
 
@@ -336,7 +336,7 @@ def _assemble(
     if not reasons and geometric_multiplicity is not None and geometric_multiplicity > 1 and "EP" in name:
         reasons = [f"{'not an EP' if defective.holds else CROSSING}: {defective.words}"]
     return Proof(
-        claim=_state_claim(name, pattern),
+        claim=_state_claim(name, pattern, problem.model.noun),
         proved=not reasons,
         reason=reasons[0] if reasons else "",
         pattern=name,
@@ -377,7 +377,7 @@ def _formula_numbers(problem: Posed) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*problem.model.numbers, *texts]))
 
 
-def _state_claim(name: str, pattern: Pattern | None) -> str:
+def _state_claim(name: str, pattern: Pattern | None, noun: str) -> str:
     if pattern is None:
         return _SIMPLE_CLAIMS.get(name, f"structure {name}")
-    return f"a design with {name} ({pattern.meaning}) exists"
+    return f"a {noun} with {name} ({pattern.meaning}) exists"

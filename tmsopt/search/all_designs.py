@@ -327,8 +327,9 @@ def _check_isolated(problem: Posed) -> None:
     if freedom.kind != "square":
         advice = "free fewer, or add == constraints" if freedom.count > 0 else "free more, or drop conditions"
         free = f"{freedom.free} free parameter{'' if freedom.free == 1 else 's'}"
-        conditions = f"{freedom.conditions} condition{'' if freedom.conditions == 1 else 's'}"
-        raise input_error(f"{free} and {conditions} do not give isolated solutions; {advice}", "parameters")
+        raise input_error(
+            f"{free} and {freedom.describe_conditions()} do not give isolated solutions; {advice}", "parameters"
+        )
 
 
 def _build_equations(problem: Posed) -> NLP:

@@ -58,7 +58,7 @@ class _Found:
 
 
 def has_chains(problem: Posed) -> bool:
-    """Whether a problem asks for a pattern of a system of the user's matrices, and for no other quantity of its roots."""
+    """Whether a problem asks for a pattern of the user's matrices, and for no quantity of their roots."""
     is_stated = problem.model.statement is not None and problem.model.pencil is not None
     asks_roots = any(problem.asks(name) for name in ROOT_NAMES) if is_stated else True
     return bool(is_stated and problem.locate and problem.free and not (problem.cases or asks_roots))
@@ -82,7 +82,7 @@ def locate_by_chains(
     found, start_count, end = list[_Found](), 0, None
     for start in chain([first], (_vector(problem, design) for design in further)):
         choice = rng if start_count % 2 else None  # every second start chooses freely which eigenvalues shall meet
-        point = find_point(family, targets, start, choice)
+        point = find_point(family, targets, start, choice, is_patient=start_count < _MIN_STARTS)
         start_count += 1
         end = end if point is None else np.clip(point.p, *family.box.T)
         if point is not None and point.is_found:

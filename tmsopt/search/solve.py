@@ -414,18 +414,12 @@ def _describe_stability(problem: Posed, checked: Evaluation, edges: Sequence[str
     unstable_note = (UNSTABLE,) if violated_limits and checked.structure.abscissa >= 0 else ()
     real_part = distance_beyond_axis(problem.model, problem.located, checked.structure.roots) if is_optimal else None
     if real_part:
-        return (
-            f"not the edge of stability: another root has real part {unit_of(problem, 'abscissa').show(real_part, 2)}",
-        )
-    if unstable_note or not is_optimal or checked.structure.abscissa < 0:
+        text = unit_of(problem, "abscissa").show(real_part, 2)
+        return (f"not the edge of stability: another root has real part {text}",)
+    is_sought = is_optimal and problem.free and minimizes_abscissa(problem)
+    if unstable_note or not is_sought or checked.structure.abscissa < 0:
         return unstable_note
     largest = max((r.size for r in checked.structure.roots), default=0.0)
     verdict = stability((checked.structure.abscissa, checked.abscissa_realised), edges, largest=largest)
-    if problem.free and minimizes_abscissa(problem):
-        edge_note = (
-            "no design that decays was found in the box; at abscissa 0, multiple roots decide whether motions grow"
-        )
-        return (
-            edge_note if verdict.on_edge else "no stable design was found in the box; this is the least unstable one",
-        )
-    return () if verdict.on_edge else ("the design is not stable: abscissa >= 0",)
+    edge_note = "no design that decays was found in the box; at abscissa 0, multiple roots decide whether motions grow"
+    return (edge_note if verdict.on_edge else "no stable design was found in the box; this is the least unstable one",)

@@ -131,10 +131,9 @@ def locate_pattern(problem: Posed, name: str | None) -> Posed:
             if freedom.count < 1
             else f"fix {freedom.count - 1} of them, or add as many == constraints"
         )
-        conditions = f"{freedom.conditions} condition{'s' * (freedom.conditions != 1)}"
         message = (
-            f"a curve of {name} needs {needed_count} free parameters ({conditions} and one to move along), "
-            f"found {freedom.free} ({free}); {advice}"
+            f"a curve of {name} needs {needed_count} free parameters ({freedom.describe_conditions()}, and one to move "
+            f"along), found {freedom.free} ({free}); {advice}"
         )
         raise input_error(message, "parameters")
     return problem_with_pattern

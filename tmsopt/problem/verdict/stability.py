@@ -151,7 +151,8 @@ def describe_stability(
         is_complex: whether the system is a complex H, so that the roots are eigenfrequencies.
     """
     if not verdict.on_edge:
-        return verdict.verdict
+        complex_words = {STABLE: "decaying", UNSTABLE: "with gain"} if is_complex else {}
+        return complex_words.get(verdict.verdict, verdict.verdict)
     root = "real eigenfrequency" if is_complex else "root on the imaginary axis"
     reason = f"from a defective {root}" if has_matrices else "as the solutions of p(d/dt) y = 0 do"
     words = f"growing as {verdict.growth}, {reason}" if verdict.growth else verdict.verdict

@@ -42,24 +42,24 @@ def describe_verdict(solution: "Solution") -> str:
         return ""
     is_limited = problem.locate or len(problem.constraints) > len(problem.posed.asked_of_roots)
     limits = " that satisfies the constraints" if is_limited else ""
-    proof = f"no design within the ranges{limits} is stable (proved)"
-    doubt = "" if solution.interrupted else "no stable design was found, but not proved that none exists"
+    model = problem.posed.model
+    proof = f"no {model.noun} within the ranges{limits} is stable (proved)"
+    doubt = "" if solution.interrupted else f"no stable {model.noun} was found, but not proved that none exists"
     remark = proof if any_stable is False else doubt
     is_sought = solution.stability_sought and not any_stable
+    words = describe_stability(
+        stability,
+        is_exact=solution.edge_is_exact,
+        has_matrices=model.pencil is not None,
+        is_complex=model.is_complex,
+    )
     if stability.verdict != UNSTABLE:
-        model = problem.model
-        words = describe_stability(
-            stability,
-            is_exact=solution.edge_is_exact,
-            has_matrices=model.pencil is not None,
-            is_complex=model.is_complex,
-        )
         return f"{words}; {remark}" if stability.on_edge and is_sought and remark else words
     if any_stable:
-        return "not stable, although some designs within the ranges are stable"
+        return f"{words}, although some {model.noun}s within the ranges are stable"
     if not (any_stable is False or (is_sought and remark)):
-        return "not stable"
-    return remark if solution.status == "infeasible" else f"not stable: {remark}"
+        return words
+    return remark if solution.status == "infeasible" else f"{words}: {remark}"
 
 
 class NotSolved(RuntimeError):
