@@ -4,14 +4,14 @@ Eigenvalues on a grid of values show between which of them one crosses or two me
 (`tmsopt.roots.chains`) then give the value to rounding. Nothing is proved between the values of the grid.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from tmsopt.chains import Family, Target, family_of, refine
+from tmsopt.chains import Axis, Family, Target, family_of, refine
 from tmsopt.dynamics.crossings import Crossing, Crossings, merge_bands
 from tmsopt.errors import input_error
 from tmsopt.problem.evaluate import evaluate_matrices
@@ -60,8 +60,8 @@ def find_eigenvalue_crossings(problem: Posed, parameters: Numbers, name: str, lo
     if not len(grid.values):
         raise input_error("is singular for every value; accepted: matrices without a root at infinity", "M")
     found, size, rounding = list[tuple[float, Root]](), np.abs(grid.s).max(), _ACCURACY * max(abs(lower), abs(upper))
-    for y, root in (*_find_meetings(scan, grid), *_find_crossings(scan, grid)):
-        y = next((x for x, _ in found if abs(x - y) <= rounding), y)
+    for at, root in (*_find_meetings(scan, grid), *_find_crossings(scan, grid)):
+        y = next((x for x, _ in found if abs(x - at) <= rounding), at)
         distances = ((abs(x - y), abs(complex(r.re, r.im) - complex(root.re, root.im))) for x, r in found)
         is_new = all(dy > _SAME * scan.step or ds > _SAME * size for dy, ds in distances)
         found += [(y, root)] * (is_new and lower < y < upper)
@@ -85,7 +85,8 @@ def find_eigenvalue_crossings(problem: Posed, parameters: Numbers, name: str, lo
         return Crossing(y, kind, root, bool((s.real <= root.re + tolerance).all()), changes)
 
     bands = [merge_bands(cells, flags.tolist()) for flags in (stable, damped, marginal)]
-    return Crossings(tuple(describe(*event) for event in found), *bands[:2], always, bands[2], zeros)
+    events = tuple(describe(*event) for event in found)
+    return Crossings(events, bands[0], bands[1], always, bands[2], zeros)
 
 
 @dataclass(frozen=True)
@@ -176,8 +177,12 @@ class _Scan:
         if not (point.is_found and point.is_isolated and abs(point.p[0] - y) <= reach * self.step):
             return None
         rounding = _ACCURACY * max(abs(s), self.family.typical_size)
-        parts = (float(x) if abs(x) > rounding else 0.0 for x in (point.roots[0].real, point.roots[0].imag))
-        return float(point.p[0]), Root(*parts, target.order)
+        re, im = (float(x) if abs(x) > rounding else 0.0 for x in (point.roots[0].real, point.roots[0].imag))
+        return float(point.p[0]), Root(re, im, target.order)
+
+    def refine_first(self, starts: Mapping[int, tuple[Target, float, complex, float]], orders: Iterable[int]) -> Any:
+        """The event of the first of the orders at which Newton steps succeed; None if there is none."""
+        return next(filter(None, (self.refine(*starts[k]) for k in orders if k in starts)), None)
 
 
 def _find_crossings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]:
@@ -212,13 +217,10 @@ def _find_meetings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]:
         is_near &= np.tri(len(s), k=-1, dtype=bool) & (is_complex | (means.imag >= 0))
         for mean, part in zip(means[is_near], steps[is_near].real, strict=True):
             is_real, nearest = mean.imag == 0 and not is_complex, s[np.argsort(np.abs(s - mean))]
-            axis, start = "real" if is_real else "complex", y + part * scan.step
-
-            def refine_first(*orders: int) -> tuple[float, Root] | None:
-                """The event of the first order that there is."""
-                targets = (Target(k, axis) for k in orders if k <= len(s))
-                steps = (scan.refine(t, start, complex(nearest[: t.order].mean()), _MAX_MOVE) for t in targets)
-                return next(filter(None, steps), None)
-
-            if event := refine_first(*_FIRST_ORDERS):
-                yield refine_first(*_HIGHER_ORDERS) or event
+            axis: Axis = "real" if is_real else "complex"
+            starts = {
+                k: (Target(k, axis), y + part * scan.step, complex(nearest[:k].mean()), _MAX_MOVE)
+                for k in range(2, len(s) + 1)
+            }
+            if event := scan.refine_first(starts, _FIRST_ORDERS):
+                yield scan.refine_first(starts, _HIGHER_ORDERS) or event
