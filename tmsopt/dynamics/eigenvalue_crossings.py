@@ -54,7 +54,7 @@ def find_eigenvalue_crossings(problem: Posed, parameters: Numbers, name: str, lo
     """
     others = {n: x for n, x in parameters.items() if n != name}
     family = family_of(problem.derive(free={name: (lower, upper)}, fixed=others))
-    scan = _Scan(problem, others, name, family, (upper - lower) / (choose_grid_size(problem.model.size) - 1))
+    scan = _Sweep(problem, others, name, family, (upper - lower) / (choose_grid_size(problem.model.size) - 1))
     grid = scan.evaluate(np.arange(lower + _OFFSET * scan.step, upper, scan.step))
     grid = grid.select(grid.is_finite)
     if not len(grid.values):
@@ -113,7 +113,7 @@ class _Spectra:
         return np.count_nonzero(self.s.real > self.errors, axis=-1)
 
     @property
-    def crossed(self) -> Any:
+    def crossing_rows(self) -> Any:
         """Numbers of the values after which an eigenvalue crosses the axis."""
         return np.flatnonzero(np.diff(self.left) * np.diff(self.right) < 0)
 
@@ -145,7 +145,7 @@ class _Spectra:
 
 
 @dataclass(frozen=True)
-class _Scan:
+class _Sweep:
     """The eigenvalues of a problem over one parameter, on a grid with a step."""
 
     problem: Posed
@@ -185,17 +185,17 @@ class _Scan:
         return next(filter(None, (self.refine(*starts[k]) for k in orders if k in starts)), None)
 
 
-def _find_crossings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]:
+def _find_crossings(scan: _Sweep, grid: _Spectra) -> Iterator[tuple[float, Root]]:
     """Eigenvalues that cross the axis: by Newton steps from the ends of short steps, or else by halvings alone."""
     spectra = grid.without_contacts()
     for _ in range(_HALVINGS):
-        k = spectra.crossed
+        k = spectra.crossing_rows
         if not len(k):
             return
         middles = scan.evaluate((spectra.values[k] + spectra.values[k + 1]) / 2)
         pairs = zip(vars(spectra).values(), vars(middles).values(), strict=True)
         spectra = _Spectra(*(np.insert(x, k + 1, new, axis=0) for x, new in pairs)).without_contacts()
-    for k in spectra.crossed:
+    for k in spectra.crossing_rows:
         y, s = float(spectra.values[k : k + 2].mean()), spectra.s[k]
         s = s[np.abs(s.real) > spectra.errors[k]]
         nearest = s[np.argsort(np.abs(s.real))[: abs(spectra.left[k + 1] - spectra.left[k])]]
@@ -205,7 +205,7 @@ def _find_crossings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]
             yield scan.refine(target, y, complex(z), _SAME) or (y, Root(0.0, float(z.imag)))
 
 
-def _find_meetings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]:
+def _find_meetings(scan: _Sweep, grid: _Spectra) -> Iterator[tuple[float, Root]]:
     """Multiple eigenvalues with one eigenvector, each with the greatest order that Newton steps confirm."""
     is_complex, shifted = scan.family.is_complex, scan.evaluate(grid.values + _SHIFT * scan.step)
     for y, s, errors, next_s in zip(*vars(grid).values(), shifted.s, strict=True):
