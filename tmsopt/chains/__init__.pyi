@@ -5,6 +5,7 @@ from .meetings import (
     meetings as meetings, nearest_crossing as nearest_crossing,
 )
 from .points import (
-    ExceptionalPoint as ExceptionalPoint, Target as Target, find_point as find_point, measure_point as measure_point,
+    Axis as Axis, ExceptionalPoint as ExceptionalPoint, Target as Target, find_point as find_point,
+    measure_point as measure_point,
     refine as refine, refine_near as refine_near, targets_of as targets_of,
 )

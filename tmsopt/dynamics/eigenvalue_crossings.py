@@ -4,16 +4,14 @@ Eigenvalues on a grid of values show between which of them one crosses or two me
 (`tmsopt.roots.chains`) then give the value to rounding. Nothing is proved between the values of the grid.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from tmsopt.chains import Family, Target, family_of, refine
-from tmsopt.chains.points import Axis
+from tmsopt.chains import Axis, Family, Target, family_of, refine
 from tmsopt.dynamics.crossings import Crossing, Crossings, merge_bands
 from tmsopt.errors import input_error
 from tmsopt.problem.evaluate import evaluate_matrices
@@ -56,14 +54,14 @@ def find_eigenvalue_crossings(problem: Posed, parameters: Numbers, name: str, lo
     """
     others = {n: x for n, x in parameters.items() if n != name}
     family = family_of(problem.derive(free={name: (lower, upper)}, fixed=others))
-    scan = _Scan(problem, others, name, family, (upper - lower) / (choose_grid_size(problem.model.degree) - 1))
+    scan = _Sweep(problem, others, name, family, (upper - lower) / (choose_grid_size(problem.model.degree) - 1))
     grid = scan.evaluate(np.arange(lower + _OFFSET * scan.step, upper, scan.step))
     grid = grid.select(grid.is_finite)
     if not len(grid.values):
         raise input_error("is singular for every value; accepted: matrices without a root at infinity", "M")
     found, size, rounding = list[tuple[float, Root]](), np.abs(grid.s).max(), _ACCURACY * max(abs(lower), abs(upper))
-    for place, root in (*_find_meetings(scan, grid), *_find_crossings(scan, grid)):
-        y = next((x for x, _ in found if abs(x - place) <= rounding), place)
+    for at, root in (*_find_meetings(scan, grid), *_find_crossings(scan, grid)):
+        y = next((x for x, _ in found if abs(x - at) <= rounding), at)
         distances = ((abs(x - y), abs(complex(r.re, r.im) - complex(root.re, root.im))) for x, r in found)
         is_new = all(dy > _SAME * scan.step or ds > _SAME * size for dy, ds in distances)
         found += [(y, root)] * (is_new and lower < y < upper)
@@ -86,11 +84,9 @@ def find_eigenvalue_crossings(problem: Posed, parameters: Numbers, name: str, lo
         changes = bool(is_bounded[cell - 1] != is_bounded[cell])
         return Crossing(y, kind, root, bool((s.real <= root.re + tolerance).all()), changes)
 
-    stable_bands, damped_bands, marginal_bands = (
-        merge_bands(cells, flags.tolist()) for flags in (stable, damped, marginal)
-    )
+    bands = [merge_bands(cells, flags.tolist()) for flags in (stable, damped, marginal)]
     events = tuple(describe(*event) for event in found)
-    return Crossings(events, stable_bands, damped_bands, always, marginal_bands, zeros)
+    return Crossings(events, bands[0], bands[1], always, bands[2], zeros)
 
 
 @dataclass(frozen=True)
@@ -117,7 +113,7 @@ class _Spectra:
         return np.count_nonzero(self.s.real > self.errors, axis=-1)
 
     @property
-    def crossed(self) -> Any:
+    def crossing_rows(self) -> Any:
         """Numbers of the values after which an eigenvalue crosses the axis."""
         return np.flatnonzero(np.diff(self.left) * np.diff(self.right) < 0)
 
@@ -149,7 +145,7 @@ class _Spectra:
 
 
 @dataclass(frozen=True)
-class _Scan:
+class _Sweep:
     """The eigenvalues of a problem over one parameter, on a grid with a step."""
 
     problem: Posed
@@ -184,18 +180,22 @@ class _Scan:
         re, im = (float(x) if abs(x) > rounding else 0.0 for x in (point.roots[0].real, point.roots[0].imag))
         return float(point.p[0]), Root(re, im, target.order)
 
+    def refine_first(self, starts: Mapping[int, tuple[Target, float, complex, float]], orders: Iterable[int]) -> Any:
+        """The event of the first of the orders at which Newton steps succeed; None if there is none."""
+        return next(filter(None, (self.refine(*starts[k]) for k in orders if k in starts)), None)
 
-def _find_crossings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]:
+
+def _find_crossings(scan: _Sweep, grid: _Spectra) -> Iterator[tuple[float, Root]]:
     """Eigenvalues that cross the axis: by Newton steps from the ends of short steps, or else by halvings alone."""
     spectra = grid.without_contacts()
     for _ in range(_HALVINGS):
-        k = spectra.crossed
+        k = spectra.crossing_rows
         if not len(k):
             return
         middles = scan.evaluate((spectra.values[k] + spectra.values[k + 1]) / 2)
         pairs = zip(vars(spectra).values(), vars(middles).values(), strict=True)
         spectra = _Spectra(*(np.insert(x, k + 1, new, axis=0) for x, new in pairs)).without_contacts()
-    for k in spectra.crossed:
+    for k in spectra.crossing_rows:
         y, s = float(spectra.values[k : k + 2].mean()), spectra.s[k]
         s = s[np.abs(s.real) > spectra.errors[k]]
         nearest = s[np.argsort(np.abs(s.real))[: abs(spectra.left[k + 1] - spectra.left[k])]]
@@ -205,7 +205,7 @@ def _find_crossings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]
             yield scan.refine(target, y, complex(z), _SAME) or (y, Root(0.0, float(z.imag)))
 
 
-def _find_meetings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]:
+def _find_meetings(scan: _Sweep, grid: _Spectra) -> Iterator[tuple[float, Root]]:
     """Multiple eigenvalues with one eigenvector, each with the greatest order that Newton steps confirm."""
     is_complex, shifted = scan.family.is_complex, scan.evaluate(grid.values + _SHIFT * scan.step)
     for y, s, errors, next_s in zip(*vars(grid).values(), shifted.s, strict=True):
@@ -217,15 +217,10 @@ def _find_meetings(scan: _Scan, grid: _Spectra) -> Iterator[tuple[float, Root]]:
         is_near &= np.tri(len(s), k=-1, dtype=bool) & (is_complex | (means.imag >= 0))
         for mean, part in zip(means[is_near], steps[is_near].real, strict=True):
             is_real, nearest = mean.imag == 0 and not is_complex, s[np.argsort(np.abs(s - mean))]
-            refine_first = partial(_refine_first, scan, "real" if is_real else "complex", y + part * scan.step, nearest)
-            if event := refine_first(_FIRST_ORDERS):
-                yield refine_first(_HIGHER_ORDERS) or event
-
-
-def _refine_first(
-    scan: _Scan, axis: Axis, y: float, nearest: Complex, orders: Sequence[int]
-) -> tuple[float, Root] | None:
-    """The event of the first order that there is."""
-    targets = (Target(k, axis) for k in orders if k <= len(nearest))
-    steps = (scan.refine(t, y, complex(nearest[: t.order].mean()), _MAX_MOVE) for t in targets)
-    return next(filter(None, steps), None)
+            axis: Axis = "real" if is_real else "complex"
+            starts = {
+                k: (Target(k, axis), y + part * scan.step, complex(nearest[:k].mean()), _MAX_MOVE)
+                for k in range(2, len(s) + 1)
+            }
+            if event := scan.refine_first(starts, _FIRST_ORDERS):
+                yield scan.refine_first(starts, _HIGHER_ORDERS) or event

@@ -186,13 +186,19 @@ def growth(
     grid = np.unique(np.concatenate([np.linspace(grid_start, high, count), *(c + offsets for c in centres)]))
     values = grid[(grid > low if is_speed else grid >= low) & (grid <= high)]
 
-    values, root_values, c = _find_roots(model, parameter_set, {**parameters, name: values}, values, coefficients)
+    root_values = (
+        _find_roots(coefficients(values))
+        if model.polynomial is not None
+        else np.sort(find_eigenvalues(model, parameter_set, {**parameters, name: values}).eigenvalues)
+    )
+    is_finite = np.isfinite(root_values).all(axis=1)  # leave out poles and roots at infinity
+    values, root_values = values[is_finite], root_values[is_finite]
     if is_polynomial:
         stable, heavily_damped = (
             _clip_bands(bands, low, high) for bands in (crossings.stable, crossings.heavily_damped)
         )
     else:
-        is_inside = is_stable(c)
+        is_inside = is_stable(coefficients(values))
         stable = tuple(_find_runs(values, is_inside, events))
         heavily_damped = tuple(_find_runs(values, is_inside & np.all(root_values.imag == 0, axis=-1), ()))
     meetings = [(c.kind, c.at) for c in events] + [(design.structure, design_value)]
@@ -225,21 +231,12 @@ def growth(
     )
 
 
-def _find_roots(
-    model: Model,
-    parameter_set: ParameterSet,
-    columns: AnyNumbers,
-    values: Array,
-    coefficients: Callable[[Array], Array],
-) -> tuple[Array, Complex, Array]:
-    """The values without poles and roots at infinity, their roots, and their coefficients if the model has them."""
-    if model.polynomial is None:
-        root_values = np.sort(find_eigenvalues(model, parameter_set, columns).eigenvalues)
-        is_finite = np.isfinite(root_values).all(axis=1)
-        return values[is_finite], root_values[is_finite], np.empty(0)
-    c = coefficients(values)
+def _find_roots(c: Array) -> Complex:
+    """Roots of the rows of coefficients; nan if one is not finite or at infinity."""
     is_finite = np.isfinite(c).all(axis=1) & (c[:, 0] != 0)
-    return values[is_finite], roots(c[is_finite]), c[is_finite]
+    found = np.full((len(c), c.shape[1] - 1), np.nan, dtype=complex)
+    found[is_finite] = roots(c[is_finite])
+    return found
 
 
 def _find_petermann(model: Model, parameter_set: ParameterSet, columns: AnyNumbers, roots: Complex) -> Array:
