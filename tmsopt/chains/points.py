@@ -378,7 +378,7 @@ def measure_point(family: Family, targets: Sequence[Target], p: Array) -> Except
 
 
 @dataclass(frozen=True)
-class ChainEquations:
+class LinearisedChains:
     """The equations of the chains at a design: residuals, slopes with respect to parameters and eigenvalues."""
 
     p: Array
@@ -400,7 +400,7 @@ def chain_equations(
     p: Array,
     roots: Sequence[complex],
     borders: Sequence[tuple[Complex, Complex]],
-) -> ChainEquations:
+) -> LinearisedChains:
     """The equations of the chains of several targets.
 
     Args:
@@ -426,11 +426,11 @@ def chain_equations(
     for part in root_rows:
         root_slopes[row : row + len(part), column : column + part.shape[1]] = part
         row, column = row + len(part), column + part.shape[1]
-    return ChainEquations(p, chains, np.concatenate(residual), np.concatenate(rows), root_slopes, sizes)
+    return LinearisedChains(p, chains, np.concatenate(residual), np.concatenate(rows), root_slopes, sizes)
 
 
 def _chain_step(
-    equations: ChainEquations, targets: Sequence[Target], family: Family, pull: Array
+    equations: LinearisedChains, targets: Sequence[Target], family: Family, pull: Array
 ) -> tuple[Array, list[complex]]:
     """The step of the parameters in shares of their ranges, and the moves of the eigenvalues.
 
@@ -453,7 +453,7 @@ def _rank(values: Any) -> int:
     return int(np.sum(values > _CUTOFF * max(values[0], 1e-300))) if values.size else 0
 
 
-def _measure_sensitivity(equations: ChainEquations, widths: Array) -> Array:
+def _measure_sensitivity(equations: LinearisedChains, widths: Array) -> Array:
     basis = np.linalg.qr(equations.root_slopes, mode="complete")[0][:, equations.root_slopes.shape[1] :]
     reduced = basis.T @ equations.slopes * widths
     if not np.isfinite(reduced).all() or _rank(np.linalg.svd(reduced, compute_uv=False)) < len(widths):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.models.user_spectrum import pattern_of
+from tmsopt.problem.evaluate import require_polynomial
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed
 from tmsopt.progress import Listener, start_steps
@@ -102,7 +103,7 @@ def domain(
 
     More: docs/how_to/charts.md
     """
-    plane = pose(problem).derive(constraints={}, minimize=None, maximize=None, locate=None)
+    plane = require_polynomial(pose(problem)).derive(constraints={}, minimize=None, maximize=None, locate=None)
     pattern_names = ("weave", "capsize", "EP2") if not plane.model.is_complex else ("weave",)
     traces = (trace(plane, name, step=step, starts=starts, seed=seed, progress=progress) for name in pattern_names)
     branches_of = {t.pattern: [b for b in t.branches if not _lies_along_edge(b, plane)] for t in traces}
