@@ -203,8 +203,7 @@ def _name_parts(s: Complex, target: Target, is_complex: bool) -> dict[str, Array
 
 def has_chain_curve(problem: Posed) -> bool:
     """Whether the pattern of a problem is traced by Jordan chains."""
-    model = problem.model
-    return model.polynomial is None or (model.is_complex and problem.locate != "weave")
+    return problem.model.polynomial is None
 
 
 def prepare_chains(problem: Posed, pattern: Pattern) -> ChainSetup:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from tmsopt.models.user_spectrum import pattern_of
-from tmsopt.problem.evaluate import require_polynomial
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed
+from tmsopt.problem.real_form import real_form
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Array, Printable, Truth, plain
 from tmsopt.roots import is_stable, real_roots
@@ -103,8 +103,9 @@ def domain(
 
     More: docs/how_to/charts.md
     """
-    plane = require_polynomial(pose(problem)).derive(constraints={}, minimize=None, maximize=None, locate=None)
-    pattern_names = ("weave", "capsize", "EP2") if not plane.model.is_complex else ("weave",)
+    form = real_form(pose(problem))
+    plane = form.problem.derive(constraints={}, minimize=None, maximize=None, locate=None)
+    pattern_names = ("weave", "capsize", "EP2") if form.carrier is None else ("weave",)
     traces = (trace(plane, name, step=step, starts=starts, seed=seed, progress=progress) for name in pattern_names)
     branches_of = {t.pattern: [b for b in t.branches if not _lies_along_edge(b, plane)] for t in traces}
     start_steps(progress, "looking for corners")
