@@ -44,7 +44,10 @@ def test_it_shows_eigenfrequencies(H, design, texts, kind, tmp_path):
     assert again.eigenfrequencies == solution.eigenfrequencies
 
 
-@pytest.mark.parametrize(("name", "omega"), [("pt_trimer", 0), ("bose_hubbard", 0), ("loss_only_dimer", -0.6j)])
+@pytest.mark.parametrize(
+    ("name", "omega"),
+    [("pt_trimer", 0), pytest.param("bose_hubbard", 0, marks=pytest.mark.slow), ("loss_only_dimer", -0.6j)],
+)
 def test_a_file_saved_at_an_exceptional_point_solves_to_it(name, omega, tmp_path):
     """The numbers of the file are rounded, and the carrier is that of a point; the EP is still recognised."""
     solution = tmsopt.solve(PROBLEMS / f"{name}.toml")

@@ -237,7 +237,9 @@ def test_the_same_EP4_in_SI():
     assert proof.held["g"] == "981/100"
 
 
-@pytest.mark.parametrize(("name", "pattern"), [("physical_machine", "EP2"), ("least_speed", "pair+real")])
+@pytest.mark.parametrize(
+    ("name", "pattern"), [pytest.param("physical_machine", "EP2", marks=pytest.mark.slow), ("least_speed", "pair+real")]
+)
 def test_patterns_of_optima(name, pattern):
     """Whatever the rightmost roots show; the proved polynomial has the abscissa of the design."""
     design = solved(name)
@@ -490,7 +492,7 @@ def test_an_EP3_that_a_last_bit_chooses_is_not_the_designs():
     At 1e-4 of a radian from there rounding has no say any more.
     """
     tilt = solved("ep4").parameters["lambda_s"]
-    for bits in range(-4, 5):
+    for bits in (-4, 0, 1):
         near = tilt + bits * math.ulp(tilt)
         assert prove_stored("ep4", "EP4", lambda_s=near).proved
         check_refused(prove_stored("ep4", "EP3", lambda_s=near), "singular")

@@ -48,7 +48,7 @@ PUBLISHED = {
 """Problem → parameters of its exceptional point, eigenfrequency and order; the sources are in the files."""
 
 
-@pytest.mark.parametrize("name", PUBLISHED)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n == "bose_hubbard")) for n in PUBLISHED])
 def test_published_exceptional_points_are_located_and_proved(name):
     where, omega, order = PUBLISHED[name]
     found = tmsopt.solve(f"problems/{name}.toml")

@@ -267,8 +267,6 @@ def test_wrong_arguments_are_answered_in_words(call, said):
 
 
 def test_a_pattern_that_is_not_found_raises_not_solved():
-    problem = tmsopt.Problem(
-        from_hamiltonian([["d - 1j", "k"], ["k", 0]]), free={"d": (2, 3), "k": (2, 3)}, locate="EP2"
-    )
+    problem = tmsopt.Problem(from_matrices(A=[[-1, "d"], ["k", -2]]), free={"d": (2, 3), "k": (2, 3)}, locate="EP2")
     with pytest.raises(tmsopt.NotSolved):
         encircle(problem)

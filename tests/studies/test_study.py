@@ -218,9 +218,9 @@ THREE = "min((Fr - 0.5)**2 + 0.1*mu, min((Fr - 2)**2 + 0.03, (Fr - 3.5)**2 + 0.1
 )
 def test_the_best_valley_is_kept(asked, sign, most):
     """What is better follows the sense of the objective."""
-    values = np.linspace(0.0, 1.0, 16).tolist()
+    values = np.linspace(0.0, 1.0, 11).tolist()
     rows = run_study(over_grid(replace(TWO, **asked), {"mu": values}, warm=True), workers=1).rows
-    assert sum(row.warm for row in rows) >= 10
+    assert sum(row.warm for row in rows) >= 6
     for row, mu in zip(rows, values, strict=True):
         assert sign * row.objective == pytest.approx(min(0.1 * mu, 0.1 * (1 - mu), most), abs=1e-12)
     best = summarise(rows).best
