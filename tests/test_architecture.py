@@ -6,11 +6,10 @@ import subprocess
 import sys
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 
 import pytest
+from helpers.places import ROOT
 
-ROOT = Path(__file__).parent.parent
 PACKAGE = "tmsopt"
 FLOORS = (
     ("errors", "records", "progress", "files", "deprecated", "executor", "killable", "threads", "versions", "laws"),

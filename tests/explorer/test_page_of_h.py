@@ -1,17 +1,16 @@
 """The page of a complex H, run by Node: its eigenfrequencies, its words, and the file that it saves."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.javascript import said_by
+from helpers.places import PROBLEMS
 
 import tmsopt
 from tmsopt.explorer import page_of
 from tmsopt.models import from_hamiltonian
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 ASK = "{get: window.tmsopt.get(), texts: rootTexts(drawingOf()), verdict: verdictOf(drawingOf()), saved: problemText()}"
 RING = [["-0.9j", "r", "l"], ["l", "-0.9j", "r"], ["r", "l", "-0.9j"]]
 CASES = (

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import flint
 import pytest
+from helpers.places import PROBLEMS
 from hypothesis import given, settings, strategies as st
 from mpmath import mp
 
@@ -286,7 +287,7 @@ def test_json_names_seconds_only_where_there_are_seconds():
     """A system of one's own, as a dimensionless bicycle, is in no unit of time."""
     own = tmsopt.models.from_matrices([[1]], [["c"]], [[1]])
     assert tmsopt.solve(tmsopt.Problem(own, fixed={"c": 1.0})).to_json()["units"] == {}
-    problems = Path(__file__).parents[2] / "problems"
+    problems = PROBLEMS
     free, robot = (tmsopt.solve(problems / f"{n}.toml").to_json()["units"] for n in ("ep4", "point_mass_robot"))
     assert not {"decay_rate", "decay_time", "frequency", "abscissa"} & set(free)
     assert (robot["decay_rate"], robot["decay_time"], robot["frequency"]) == ("1/s", "s", "Hz")

@@ -8,12 +8,13 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from flint import arb, ctx, fmpq
+from helpers.oracles import ep4_of_heights
+from helpers.places import PROBLEMS
 from mpmath import atan, mp, mpf, sqrt, tan, workdps
 
 from tmsopt import InputError, Problem, load, models, prove, solve
@@ -27,7 +28,6 @@ from tmsopt.roots import exact_roots, product
 
 factored = import_module("tmsopt.proofs.factorisation")
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 HEIGHTS = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 SQRT2 = math.sqrt(2)
 
@@ -57,14 +57,6 @@ def check_refused(proof, *words):
 def holds(found, truth):
     """Whether an mpmath number is within the radius of a decimal, to the precision of mpmath."""
     return bool(abs(mpf(found.value) - truth) <= mpf(found.radius) + mpf(10) ** (5 - mp.dps))
-
-
-def ep4_of_heights(zeta_B, zeta_H):
-    """Compact forms of χ_B, T, Fr and the 4-fold root at χ_H = 1 (equations chib1, tls, frep4, w01)."""
-    r, h = sqrt(zeta_B / zeta_H), sqrt(zeta_B * zeta_H)
-    T = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
-    Fr = (r**2 + 6 * r + 1) / (4 * sqrt(h) * (r + 1))
-    return {"chi_B": r, "T": T, "Fr": Fr, "r": -1 / sqrt(h)}
 
 
 def ep_set(T):
