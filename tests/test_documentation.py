@@ -5,16 +5,15 @@ import math
 import re
 import tomllib
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 from helpers import pages
 from helpers.pages import NUMBER, agrees, lines_of
+from helpers.places import ROOT
 
 import tmsopt
 from tmsopt.cli import main
 
-ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *pages.PAGES])
 README, CONTRIBUTING = (ROOT / name for name in ("README.md", "CONTRIBUTING.md"))
 

@@ -10,9 +10,9 @@ import shutil
 import sqlite3
 from contextlib import closing, suppress
 from datetime import timedelta
-from pathlib import Path
 
 import pytest
+from helpers.places import ROOT
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 import tmsopt
@@ -20,7 +20,6 @@ from tmsopt.cli import main
 
 pytestmark = pytest.mark.long
 
-ROOT = Path(__file__).parents[1]
 FILES = sorted((ROOT / "problems").glob("*.toml"))
 PROBLEMS = [p for p in FILES if not p.name.startswith("study_")]
 STUDIES = [p for p in FILES if p.name.startswith("study_")]

@@ -583,22 +583,3 @@ def _fraction(number):
     """An mpf as it is stored, a dyadic rational."""
     sign, mantissa, exponent, _ = number._mpf_
     return (-1) ** sign * Fraction(int(mantissa)) * Fraction(2) ** exponent
-
-
-@pytest.mark.parametrize(
-    ("coefficients", "structure", "stable"),
-    [
-        ([1, 4, 6, 4, 1], [(4, 1)], True),
-        ([1, 0, 2, 0, 1], [(2, 2)], False),
-        ([-1, -5, -9, -7, -2], [(1, 1), (3, 1)], True),
-        ([1, -3, 3, -1, 0, 0], [(2, 1), (3, 1)], False),
-        ([1, 1, 1, 1], [(1, 3)], False),
-    ],
-    ids=["EP4", "double imaginary pair", "EP3 with a0 < 0", "zeros and a triple", "on the axis"],
-)
-def test_the_oracles_on_multiple_roots(coefficients, structure, stable):
-    assert oracles.exact_multiplicities(coefficients) == structure
-    assert oracles.routh_exact(coefficients) is stable
-    rebuilt = oracles.elementary(oracles.roots_60(coefficients))
-    assert all(abs(c * coefficients[0] - d) < 1e-55 for c, d in zip(rebuilt, coefficients, strict=True))
-    assert (oracles.discriminant_exact(coefficients) == 0) == (structure[-1][0] > 1)

@@ -8,15 +8,14 @@ import subprocess
 import sys
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.places import PROBLEMS
 
 import tmsopt
 from tmsopt.studies import read_results
 
-PROBLEMS = Path(__file__).parents[1] / "problems"
 EP4, PLANE = PROBLEMS / "ep4.toml", PROBLEMS / "chart.toml"
 
 ASKED = {

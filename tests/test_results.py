@@ -6,11 +6,11 @@ import pickle
 from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
-from pathlib import Path
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import pytest
+from helpers.places import PROBLEMS
 from matplotlib.axes import Axes
 
 import tmsopt
@@ -18,7 +18,6 @@ from tmsopt.documents import MODULE_BY_CLASS, picture_of
 from tmsopt.models import from_coefficients
 
 mpl.use("Agg")
-PROBLEMS = Path(__file__).parents[1] / "problems"
 TITLE = "<script>alert(1)</script> & a title of more than one hundred characters, so that no line of it has room for the whole"
 VOID = {"img", "br", "meta"}
 

@@ -148,7 +148,7 @@ def test_constants_are_exact():
     assert parse_value("1/3 + 0.1", []).formula.constants == [Fraction(13, 30)]
     for text, value in {
         "1/3": 1 / 3,
-        "1e-400*1e400" if False else "1e-300/1e300": 0.0,
+        "1e-300/1e300": 0.0,
         "2*pi/3": 2 * math.pi / 3,
     }.items():
         assert as_double(parse_value(text, []).formula.constants[0]) == pytest.approx(value, rel=2e-16)

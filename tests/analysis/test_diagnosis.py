@@ -12,7 +12,8 @@ import mpmath
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from helpers.oracles import polynomial_60, roots_60
+from helpers.oracles import ep4_of_heights, polynomial_60, roots_60
+from helpers.skates import FIXED
 from mpmath import mp
 
 import tmsopt
@@ -258,20 +259,10 @@ def test_every_parameter_is_listed_with_its_law_by_how_far_it_moves_the_root():
 
 
 def ep4():
-    """Compact closed form for χ_H = 1, with r = √(ζ_B/ζ_H) and h = √(ζ_B ζ_H), rounded to doubles."""
+    """The closed form for χ_H = 1, rounded to doubles."""
     with mp.workdps(40):
-        r, h = mp.sqrt(2), mp.sqrt(mp.mpf("0.08"))
-        T = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
-        Fr = (r**2 + 6 * r + 1) / (4 * mp.sqrt(h) * (r + 1))
-        return {
-            "Fr": float(Fr),
-            "mu": 0.1,
-            "chi_B": float(r),
-            "chi_H": 1.0,
-            "zeta_B": -0.4,
-            "zeta_H": -0.2,
-            "lambda_s": float(mp.atan(T)),
-        }
+        at = ep4_of_heights(mp.mpf("-0.4"), mp.mpf("-0.2"))
+        return FIXED | {"Fr": float(at["Fr"]), "chi_B": float(at["chi_B"]), "lambda_s": float(mp.atan(at["T"]))}
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import json
 import pytest
 from helpers.hunt import PROBLEMS
 from helpers.oracles import polynomial_60
-from helpers.structures import FORMS, native_60, pair, times
+from helpers.structures import FORMS, native_60, pair, quantities_60, times
 from mpmath import mp
 
 import tmsopt
@@ -21,28 +21,9 @@ STEP = mp.mpf(10) ** -20  # of central differences at 80 digits: slopes right to
 
 def names_60(parameters, unknowns):
     """What the objectives and limits below speak of; the first unknown is the abscissa."""
-    q = native_60(parameters)
-    nu_H = (q["chi_H"] - 1) * mp.cos(q["lambda_s"]) - q["zeta_H"] * mp.sin(q["lambda_s"])
-    centre = (q["chi_B"] + q["mu"] * q["chi_H"]) / (1 + q["mu"])
-
-    def determinant(Fr):
-        a0, a1, a2, a3, a4 = polynomial_60(**{**q, "Fr": mp.mpf(Fr)})
-        return (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4) / Fr**2
-
-    one, two = determinant(1), determinant(2)
-    found = {
-        **parameters,
-        "abscissa": unknowns[0],
-        "nu_H": nu_H,
-        "chi_T": centre,
-        "ballast_rear": (centre - 1) * (1 + q["mu"]),  # where the rear wheel lifts, or is about to
-    }
-    if "w" in parameters:
-        found |= {
-            "u_H": nu_H * parameters["w"],
-            "v_c": mp.sqrt(1 - 3 * one / (two - one)) * mp.sqrt(parameters["g"] * parameters["w"]),
-        }
-    return found
+    found = quantities_60(parameters)
+    overhang = (found["chi_T"] - 1) * (1 + found["mu"])  # where the rear wheel lifts, or is about to
+    return {**parameters, **found, "abscissa": unknowns[0], "ballast_rear": overhang}
 
 
 def gains_60(data, problem):

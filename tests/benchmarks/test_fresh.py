@@ -7,6 +7,7 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
+from helpers.bicycles import MATRICES
 
 from benchmarks.suites.fresh import FAMILIES, judge, known, problems
 from benchmarks.suites.fresh.bicycles import BENCHMARK, SI, TMS, whipple
@@ -17,10 +18,9 @@ from benchmarks.suites.fresh.problem import System, eigenvalues, measure_exactly
 def test_whipple_has_the_published_matrices():
     """Meijaard, Papadopoulos, Ruina and Schwab (2007), equations 6.2 to 6.5, at v = 1 m/s."""
     mass, damping, stiffness = whipple({**BENCHMARK, "lambda_s": math.pi / 10, "g": 9.81, "v": 1}, math.sin, math.cos)
-    assert np.allclose(mass, [[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]], atol=1e-13)
-    assert np.allclose(damping, [[0, 33.86641391492494], [-0.85035641456978, 1.68540397397560]], atol=1e-13)
-    still = np.array([[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]])
-    with_speed = [[0, 76.59734589573222], [0, 2.65431523794604]]
+    M, C1, still, with_speed = map(np.array, MATRICES)
+    assert np.allclose(mass, M, atol=1e-13)
+    assert np.allclose(damping, C1, atol=1e-13)
     assert np.allclose(stiffness, 9.81 * still + with_speed, atol=1e-11)
 
 

@@ -273,7 +273,6 @@ def test_units_do_not_matter(name):
         assert second.limit.direction[partner[n]] == pytest.approx(first.limit.direction[n], abs=1e-6)
 
 
-@pytest.mark.slow
 def test_weights_are_units():
     """Twice the weights, half the distance; a weight 0 and a missing one hold a parameter."""
     weights = {n: abs(v) for n, v in OFF.items()}
@@ -397,7 +396,6 @@ def test_no_boundary_point_is_one_of_cancellation_alone():
     assert describe_robustness(found).endswith("makes it unstable")
 
 
-@pytest.mark.slow
 def test_beside_every_boundary_point_of_stable_designs_there_is_an_unstable_one():
     """By Hurwitz's conditions in fractions; corners are among the points, where ever more coefficients vanish."""
     rng = np.random.default_rng(7)

@@ -6,7 +6,7 @@ from matplotlib.colors import LogNorm
 
 import tmsopt
 from tmsopt.charts import chart, plan_survey
-from tmsopt.models import Model, Parameter, ParameterSet, from_coefficients, from_hamiltonian, from_matrices
+from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
 from tmsopt.problem import Problem
 
 LAYERS = ("petermann", "phase_rigidity")
@@ -67,26 +67,6 @@ def test_an_exceptional_point_of_the_grid_and_one_without_mass():
     assert np.isfinite(found.petermann[:, 1:]).all()
     assert found.petermann[1, 1] > 1e12
     assert found.phase_rigidity[1, 1] < 1e-6
-
-
-def test_a_hundred_modes_without_their_polynomial():
-    """Hopping by ρ and 1/ρ, with loss g everywhere: ψₘ = ρ^(±m) sin(m θ) on the two sides; g changes no eigenvector."""
-    n = 100
-    parameters = (Parameter("rho", "1", "asymmetry", "r"), Parameter("g", "1", "loss", "g"))
-
-    def pencil(p):
-        entries = {-1: -p["rho"], 1: -1 / p["rho"], 0: p["g"]}
-        return np.eye(n).tolist(), [[entries.get(j - i, 0.0) for j in range(n)] for i in range(n)]
-
-    sets = (ParameterSet("plain", parameters, dict),)
-    model = Model("chain", "chain", n, sets, dict, None, pencil=pencil)
-    found = charted(Problem(model, free={"rho": (1.0, 1.03), "g": (0.1, 0.2)}), (3, 2))
-    m = np.arange(1, n + 1)
-    sines = np.sin(np.pi * np.outer(m, m) / (n + 1)) ** 2
-    rho = found.grid[0][:, None, None]
-    rigidity = sines.sum(axis=1) / np.sqrt(np.prod([(rho ** (s * 2 * m) * sines).sum(axis=2) for s in (1, -1)], axis=0))
-    wanted = np.broadcast_to(rigidity.min(axis=1), (2, 3))
-    assert found.phase_rigidity == pytest.approx(wanted, rel=1e-7)
 
 
 def test_coefficients_are_computed_only_for_layers_that_need_them():

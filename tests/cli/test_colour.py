@@ -8,7 +8,7 @@ import pytest
 from helpers.terminal import ROOT, environment, on_a_terminal
 
 EP4 = str(ROOT / "problems" / "ep4.toml")
-STUDY = str(ROOT / "problems" / "study_heights.toml")
+FILES = {"speeds": "ep4", "study": "study_heights"}
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="terminals of POSIX")
 
 
@@ -47,8 +47,8 @@ def test_a_terminal_has_colours_unless_somebody_objects(words, own, coloured, tm
         (("--color", "always", "solve", EP4, "--color", "never"), False),
     ],
 )
-def test_a_pipe_has_colours_where_they_are_asked_for(words, coloured):
-    assert is_coloured(in_a_pipe(*words).decode()) is coloured
+def test_a_pipe_has_colours_where_they_are_asked_for(words, coloured, run):
+    assert is_coloured(run(*words)[1]) is coloured
 
 
 def test_another_word_for_colours_is_refused(run):
@@ -57,12 +57,13 @@ def test_another_word_for_colours_is_refused(run):
     assert all(word in err for word in ("auto", "always", "never"))
 
 
-@pytest.mark.parametrize("columns", [80, 60])
-@pytest.mark.parametrize("command", [["speeds", EP4], ["study", STUDY]], ids=lambda words: words[0])
-def test_a_report_fits_the_terminal(command, columns, tmp_path):
-    seen = on_a_terminal([*command, "--color=never"], tmp_path, columns=columns, whole=True)
+@pytest.mark.parametrize("command", ["speeds", "study"])
+def test_a_report_fits_the_terminal(command, tmp_path):
+    file = tmp_path / "few.toml"
+    file.write_text((ROOT / "problems" / f"{FILES[command]}.toml").read_text().replace("rows = 32", "rows = 4"))
+    seen = on_a_terminal([command, file, "--color=never"], tmp_path, columns=60, whole=True)
     lines = seen.text.split("\033[K")[-1].replace(str(tmp_path), "").splitlines()  # a path is one word
-    assert max(map(len, lines)) <= columns
+    assert max(map(len, lines)) <= 60
 
 
 def test_a_narrow_encoding_gets_its_own_letters():

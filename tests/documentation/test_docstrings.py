@@ -5,15 +5,14 @@ import inspect
 import math
 import re
 from importlib import import_module
-from pathlib import Path
 
 import matplotlib.pyplot
 import numpy as np
 import pytest
+from helpers.places import ROOT
 
 import tmsopt
 
-ROOT = Path(__file__).parents[2]
 FACES = ("tmsopt", "tmsopt.models", "tmsopt.roots", "tmsopt.laws", "tmsopt.plots")
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 NEEDS = {"tmsopt.certify": "pyscipopt"}

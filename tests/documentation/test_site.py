@@ -7,14 +7,13 @@ import sys
 import tomllib
 from html import unescape
 from html.parser import HTMLParser
-from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+from helpers.places import ROOT
 
 import tmsopt
 
-ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.slow
 RUN = "ep4", "three_masses", "whipple_ep4"  # all of them run where the site is built for readers
 

@@ -4,9 +4,9 @@ import ast
 import io
 import re
 import tokenize
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from helpers.places import ROOT
+
 MODULES = sorted((ROOT / "tmsopt").rglob("*.py"))
 WRITTEN = sorted(p for p in (ROOT / "docs").rglob("*.md") if p.parent.name not in ("generated", "gallery"))
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *WRITTEN]

@@ -6,7 +6,6 @@ which take any two rigid bodies; a point mass is a body without inertia of its o
 
 import math
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,8 +21,6 @@ from tmsopt.problem.units import convert_to_reading, parse_quantity
 
 NATIVE, SI = tms.sets
 EPS = np.finfo(float).eps
-Body = tuple[Any, Any, Any]
-"""A point mass m at x forward and z downward."""
 
 
 def values(p, of=NATIVE):
@@ -59,43 +56,13 @@ def lateral_of(p):
     return lateral(*masses, p["w"], p["v"], p.get("g", 9.81), math.sin(p["lambda_s"]), math.cos(p["lambda_s"]))
 
 
-NAMES = "mu chi_B chi_H zeta_B zeta_H Fr sine cosine m"
-mu, chi_B, chi_H, zeta_B, zeta_H, Fr, sine, cosine, m = sympy.symbols(NAMES, positive=True)
-B, H = (sympy.Integer(1), chi_B, zeta_B), (mu, chi_H, zeta_H)
-SCALES = (1, Fr, 1, sine, cosine)  # w = 1, g = 1, v = Fr
-
-
 def test_the_equations_used_here_are_those_of_the_model():
     """Two independent sources, one system: so that what follows is about the model."""
-    paper = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, sine, cosine)
-    general = lateral([B], [H], *SCALES)
+    names = "mu chi_B chi_H zeta_B zeta_H Fr sine cosine"
+    mu, chi_B, chi_H, zeta_B, zeta_H, Fr, *turn = sympy.symbols(names, positive=True)
+    paper = matrices(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, *turn)
+    general = lateral([(1, chi_B, zeta_B)], [(mu, chi_H, zeta_H)], 1, Fr, 1, *turn)
     assert [sympy.expand(e) for e in np.ravel(np.array(paper) - np.array(general))] == [0] * 12
-
-
-def changes(rear, front):
-    """Entries of the matrices less those of the bicycle of two masses."""
-    difference = np.array(lateral(rear, front, *SCALES)) - np.array(lateral([B], [H], *SCALES))
-    return [sympy.cancel(e) for e in difference.ravel()]
-
-
-@pytest.mark.parametrize("contact", [0, 1])
-@pytest.mark.parametrize("carrier", ["rear", "front"])
-def test_ballast_at_a_contact_has_no_part_in_the_lateral_motion(contact, carrier):
-    """For any mass: its rigid body has another centre and inertia, and M, V and P stay as they are.
-
-    On the rear frame at either contact, and on the front assembly at the front contact, which the steer axis meets.
-    """
-    ballast = (m, sympy.Integer(contact), sympy.Integer(0))
-    rear, front = ([B, ballast], [H]) if carrier == "rear" else ([B], [H, ballast])
-    change = changes(rear, front)
-    if (contact, carrier) == (0, "front"):
-        assert any(change)  # the rear contact is no place on the front assembly: it lies off the steer axis
-    else:
-        assert change == [0] * 12
-
-
-def test_ballast_above_the_contact_does_change_the_motion():
-    assert any(changes([B, (m, 0, sympy.Rational(-1, 10))], [H]))
 
 
 # Statics

@@ -16,12 +16,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 from helpers.browser import opened
+from helpers.places import PROBLEMS
 
 import tmsopt
 from tmsopt.problem import unit_of
 from tmsopt.roots import CLASSES
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 HOSTILE = '</title><script>alert(1)</script><b> & "quoted" $\\frac{ ]]> '
 VOID = {"meta", "link", "img", "input", "br"}
 HALF = 0.5000001  # of the last digit that is shown

@@ -243,6 +243,5 @@ def test_a_proof_that_was_tried_in_vain_is_told_so():
 def test_a_pattern_that_is_missed_is_called_one_whatever_its_name():
     """``EP2+EP2`` is 2EP2; between 0.1 and 0.2 this damping is too weak for any real root."""
     weak = tmsopt.models.from_matrices(M=[[1, 0], [0, 1]], D=[["c", 0], [0, "d"]], K=[[1, 0], [0, 2]])
-    for name in ("2EP2", "EP2+EP2"):
-        problem = tmsopt.Problem(weak, free={"c": (0.1, 0.2), "d": (0.1, 0.2)}, locate=name)
-        assert "violated: 2EP2 (pattern)" in str(tmsopt.solve(problem, throw=False))
+    problem = tmsopt.Problem(weak, free={"c": (0.1, 0.2), "d": (0.1, 0.2)}, locate="EP2+EP2")
+    assert "violated: 2EP2 (pattern)" in str(tmsopt.solve(problem, throw=False, starts=4))

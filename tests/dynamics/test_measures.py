@@ -4,11 +4,11 @@ import csv
 import json
 import math
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from helpers.places import PROBLEMS
 from mpmath import mp
 from scipy.integrate import quad
 from scipy.linalg import eig
@@ -18,7 +18,6 @@ from tmsopt.cli import command_group as main
 from tmsopt.dynamics import simulate_noise, stationary_covariance
 from tmsopt.models import canonical, from_matrices, whipple
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 BENCHMARK = PROBLEMS / "whipple_benchmark.toml"
 
 

@@ -3,10 +3,11 @@
 import math
 import pickle
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.oracles import ep4_of_heights
+from helpers.places import PROBLEMS
 from mpmath import mp
 from scipy.integrate import solve_ivp
 
@@ -14,7 +15,6 @@ import tmsopt
 from tmsopt.dynamics import system_of
 from tmsopt.models import canonical, from_matrices, matrices, tms, whipple
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 BENCHMARK, EP4 = PROBLEMS / "whipple_benchmark.toml", PROBLEMS / "ep4.toml"
 STATES = ("phi", "delta", "phidot", "deltadot")
 
@@ -106,17 +106,15 @@ def test_two_masses_in_si_move_as_whipple_without_wheels():
 
 def ideal_ep4():
     """A and the fourfold root of EP4 at χ_H = 1, ζ_B = −0.4, ζ_H = −0.2 from the closed form, at the digits of mp."""
-    zeta_B, zeta_H = mp.mpf("-0.4"), mp.mpf("-0.2")
-    r, h = mp.sqrt(zeta_B / zeta_H), mp.sqrt(zeta_B * zeta_H)
-    T = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
-    Fr = (r**2 + 6 * r + 1) / (4 * mp.sqrt(h) * (r + 1))
+    heights = mp.mpf("-0.4"), mp.mpf("-0.2")
+    chi_B, T, Fr, root = ep4_of_heights(*heights).values()
     cosine = 1 / mp.sqrt(1 + T**2)
-    M, V, P = (mp.matrix(m) for m in matrices(Fr, mp.mpf("0.1"), r, 1, zeta_B, zeta_H, T * cosine, cosine))
+    M, V, P = (mp.matrix(m) for m in matrices(Fr, mp.mpf("0.1"), chi_B, 1, *heights, T * cosine, cosine))
     A = mp.zeros(4)
     for i in range(2):
         A[i, i + 2] = 1
     A[2:4, 0:2], A[2:4, 2:4] = -mp.inverse(M) * P, -mp.inverse(M) * V
-    return A, -1 / mp.sqrt(h)
+    return A, root
 
 
 @pytest.mark.parametrize("start", [(1.0, 0.0, 0.0, 0.0), (0.0, 0.1, 0.0, -0.5)])

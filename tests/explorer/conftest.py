@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 from helpers.browser import opened
+from helpers.places import PROBLEMS
 
 import tmsopt
-
-PROBLEMS = Path(__file__).parents[2] / "problems"
 
 
 @pytest.fixture(scope="session")

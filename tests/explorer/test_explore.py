@@ -6,17 +6,16 @@ import re
 import tomllib
 import webbrowser
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.places import PROBLEMS
 
 import tmsopt
 from tmsopt import laws
 from tmsopt.explorer import page_of
 from tmsopt.roots import hurwitz_minors
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 PLAIN = [p for p in sorted(PROBLEMS.glob("*.toml")) if not p.name.startswith("study_")]
 HOSTILE = "</script><script>alert(1)</script>&<b>"
 

@@ -4,7 +4,6 @@ import math
 import re
 from fractions import Fraction
 from itertools import count, islice
-from pathlib import Path
 
 import flint
 import numpy as np
@@ -13,6 +12,7 @@ import scipy.linalg
 from helpers.curves import sturm
 from helpers.javascript import ask
 from helpers.oracles import routh_exact
+from helpers.places import PROBLEMS as FOLDER
 
 from tmsopt.algebra import BALLS, exact
 from tmsopt.explorer import kernel_script, model_script
@@ -20,7 +20,6 @@ from tmsopt.models import Values, from_coefficients, from_matrices
 from tmsopt.problem import Problem, load
 from tmsopt.roots import backward_error, classify, find_motion, quartic_classes, roots
 
-FOLDER = Path(__file__).parents[2] / "problems"
 FILES = (
     "ep4 point_mass_robot whipple_ep4 whipple_benchmark brake_squeal pt_pair ziegler_undamped three_masses_pt chocolate "
     "two_mass_spring three_masses transport_aircraft"

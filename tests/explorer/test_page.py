@@ -16,7 +16,6 @@ from tmsopt.problem import array_function
 
 pytestmark = pytest.mark.slow
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 PAGE = Path(tmsopt.__file__).parent / "explorer" / "page"
 NAMES = ("ep4", "whipple_ep4", "point_mass_robot", "pt_pair", "three_masses")
 MARKUP = "<script>alert(1)</script><b>"

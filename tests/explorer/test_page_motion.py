@@ -7,24 +7,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.bicycles import MATRICES
 from helpers.browser import drawn, press
+from helpers.places import PROBLEMS
 from scipy.integrate import solve_ivp
 
 import tmsopt
 
 pytestmark = pytest.mark.slow
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 PAGE = Path(tmsopt.__file__).parent / "explorer" / "page"
 BICYCLES = ["whipple_benchmark", "point_mass_robot", "ep4"]
-BENCHMARK = {
-    "M": [[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]],
-    "C1": [[0, 33.86641391492494], [-0.85035641456978, 1.68540397397560]],
-    "K0": [[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]],
-    "K2": [[0, 76.59734589573222], [0, 2.65431523794604]],
-}
-"""Meijaard et al. (2007), table 2 and equation (5.3)."""
-
 PAIR = """title = "Two carts"
 [model]
 M = [[1, 0], [0, 2]]
@@ -53,7 +46,7 @@ def first_order(M, D, K):
 def equations(explorer, values):
     """A of z' = A z for lean, steer and their rates, and the rates after an impulse of 1, in the units of the file."""
     if "I_Rxx" in values:  # of Whipple, by the published matrices
-        M, C1, K0, K2 = (np.array(m) for m in BENCHMARK.values())
+        M, C1, K0, K2 = (np.array(m) for m in MATRICES)
         return first_order(M, values["v"] * C1, 9.81 * K0 + values["v"] ** 2 * K2), np.linalg.solve(M, [0, 1])
     of, pencil = explorer.problem.posed.parameter_set, explorer.problem.model.pencil
     M, D, K = (np.array(m, dtype=float) for m in pencil(of.native(values)))

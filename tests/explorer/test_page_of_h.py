@@ -1,17 +1,16 @@
 """The page of a complex H, run by Node: its eigenfrequencies, its words, and the file that it saves."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.javascript import said_by
+from helpers.places import PROBLEMS
 
 import tmsopt
 from tmsopt.explorer import page_of
 from tmsopt.models import from_hamiltonian
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 ASK = "{get: window.tmsopt.get(), texts: rootTexts(drawingOf()), verdict: verdictOf(drawingOf()), saved: problemText()}"
 RING = [["-0.9j", "r", "l"], ["l", "-0.9j", "r"], ["r", "l", "-0.9j"]]
 CASES = (
@@ -44,7 +43,10 @@ def test_it_shows_eigenfrequencies(H, design, texts, kind, tmp_path):
     assert again.eigenfrequencies == solution.eigenfrequencies
 
 
-@pytest.mark.parametrize(("name", "omega"), [("pt_trimer", 0), ("bose_hubbard", 0), ("loss_only_dimer", -0.6j)])
+@pytest.mark.parametrize(
+    ("name", "omega"),
+    [("pt_trimer", 0), pytest.param("bose_hubbard", 0, marks=pytest.mark.slow), ("loss_only_dimer", -0.6j)],
+)
 def test_a_file_saved_at_an_exceptional_point_solves_to_it(name, omega, tmp_path):
     """The numbers of the file are rounded, and the carrier is that of a point; the EP is still recognised."""
     solution = tmsopt.solve(PROBLEMS / f"{name}.toml")

@@ -1,16 +1,14 @@
 """The pictures of the page in Chromium: what they show is what the package computes, and hands can move it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from helpers.browser import drawn, press
+from helpers.places import PROBLEMS
 
 import tmsopt
 
 pytestmark = pytest.mark.slow
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 GRID = 200
 
 POLE = """title = "A root at infinity"

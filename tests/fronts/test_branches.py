@@ -17,6 +17,8 @@ X0, X1, X2 = 1.1854, 1.474, -0.8003
 BELOW = -0.0405
 """Above the abscissa of that design."""
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def front():
@@ -24,7 +26,6 @@ def front():
     return tmsopt.pareto(problem, 9, workers=1)
 
 
-@pytest.mark.slow
 def test_no_point_is_dominated_by_a_design_of_another_branch(front):
     """Its roots lie left of BELOW by Hurwitz' conditions on the polynomial shifted there."""
     first, last = np.poly1d([1, 0.627 - 1.329 * X2, -0.134]), np.poly1d([1, -0.061, 2.915 + 1.91 * X0 * X2])

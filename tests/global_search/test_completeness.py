@@ -2,12 +2,12 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 import sympy as sp
+from helpers.places import PROBLEMS
 from mpmath import acos, atan, cos, mpf, nstr, pi, sqrt, workdps
 
 from tmsopt import Problem, load, solve_all
@@ -15,7 +15,6 @@ from tmsopt.global_search import prove_completeness
 from tmsopt.models import from_coefficients
 from tmsopt.roots import pattern as pattern_of_name
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 DIGITS = mpf(10) ** -22  # of 25 that are given
 
 x, y, z = (ca.SX.sym(n) for n in "xyz")

@@ -2,14 +2,12 @@
 
 import tomllib
 from importlib import import_module
-from pathlib import Path
 
 import pytest
+from helpers.places import ROOT
 
 import tmsopt
 from tmsopt.guide import TEMPLATES, companions, example, examples, new_problem
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture

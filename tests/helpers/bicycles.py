@@ -36,6 +36,14 @@ BENCHMARK = {
 }
 """Meijaard, Papadopoulos, Ruina and Schwab (2007), table 1."""
 
+MATRICES = (
+    [[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]],
+    [[0, 33.86641391492494], [-0.85035641456978, 1.68540397397560]],
+    [[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]],
+    [[0, 76.59734589573222], [0, 2.65431523794604]],
+)
+"""M, C1, K0, K2 of the benchmark, as printed there."""
+
 BODIES = "w c r_R m_R I_Rxx I_Ryy x_B z_B m_B I_Bxx I_Bzz I_Bxz x_H z_H m_H I_Hxx I_Hzz I_Hxz r_F m_F I_Fxx I_Fyy"
 
 

@@ -8,14 +8,13 @@ solver of another kind, from another start, on another formulation, leaves littl
 import re
 import tomllib
 from math import pi
-from pathlib import Path
 
 import numpy as np
+from helpers.places import PROBLEMS
 from scipy.optimize import differential_evolution
 
 from tmsopt import laws
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "kg": 1.0, "m/s": 1.0, "deg": pi / 180}
 GRAVITY = 9.81
 NATIVE = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")

@@ -72,6 +72,14 @@ def _determinant(M, V, P):
     return [a - b for a, b in zip(main, cross, strict=True)]
 
 
+def ep4_of_heights(zeta_B, zeta_H):
+    """Compact forms of χ_B, T, Fr and the 4-fold root at χ_H = 1 (equations chib1, tls, frep4, w01)."""
+    r, h = mp.sqrt(zeta_B / zeta_H), mp.sqrt(zeta_B * zeta_H)
+    T = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
+    Fr = (r**2 + 6 * r + 1) / (4 * mp.sqrt(h) * (r + 1))
+    return {"chi_B": r, "T": T, "Fr": Fr, "r": -1 / mp.sqrt(h)}
+
+
 # Roots at 60 digits
 
 

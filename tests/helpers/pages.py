@@ -13,7 +13,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from helpers.places import ROOT
+
 PAGES = sorted(page for page in (ROOT / "docs").rglob("*.md") if page.parent.name not in ("generated", "gallery"))
 """The pages that are written by hand."""
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")

@@ -2,18 +2,16 @@
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from pathlib import Path
 
 import pytest
+from helpers.places import PROBLEMS
 
 from tmsopt.errors import InputError
 from tmsopt.problem import load
 from tmsopt.records import Table
 from tmsopt.studies import Row, Study, view_store
 
-STUDY = Study(
-    load(Path(__file__).parents[2] / "problems" / "ep4.toml"), {"mu": [0.1 + 1e-6 * n for n in range(100_000)]}, seed=7
-)
+STUDY = Study(load(PROBLEMS / "ep4.toml"), {"mu": [0.1 + 1e-6 * n for n in range(100_000)]}, seed=7)
 
 
 def row(number, study=STUDY, **given):

@@ -1,5 +1,6 @@
 """Factored forms of every structure of four roots, and the dimensionless design, in mpmath."""
 
+from helpers.oracles import polynomial_60
 from mpmath import mp
 
 NATIVE = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
@@ -17,6 +18,57 @@ def native_60(p):
         **{chi: exact[x] / exact["w"] for chi, x in LENGTHS.items()},
         "lambda_s": exact["lambda_s"],
     }
+
+
+def quantities_60(p):
+    """Every derived quantity but those of the roots; None where it does not exist."""
+    q = native_60(p)
+    _, mu, chi_B, chi_H, zeta_B, zeta_H, lam = (q[name] for name in NATIVE)
+    nu_H = (chi_H - 1) * mp.cos(lam) - zeta_H * mp.sin(lam)
+    a = polynomial_60(**q)
+    M = mp.matrix([[mu * zeta_H**2 + zeta_B**2, -mu * zeta_H * nu_H], [-mu * zeta_H * nu_H, mu * nu_H**2]])
+    centre = (chi_B + mu * chi_H) / (1 + mu)
+    found = {
+        **{f"a{k}": c for k, c in enumerate(a)},
+        **q,
+        "nu_H": nu_H,
+        "omega0": -mp.root(a[4] / a[0], 4) if a[4] / a[0] >= 0 else None,
+        "Fr_c": weave(q),
+        "chi_T": centre,
+        "load_front": centre,
+        "load_rear": 1 - centre,
+        "ballast_rear": max(mp.mpf(0), (centre - 1) * (1 + mu)),
+        "ballast_front": max(mp.mpf(0), -centre * (1 + mu)),
+        "mass_margin": min(mp.eigsy(M, eigvals_only=True)),
+    }
+    if "g" in p:
+        weight = (p["m_B"] + p["m_H"]) * p["g"]
+        found |= {
+            "v_c": None if found["Fr_c"] is None else found["Fr_c"] * mp.sqrt(p["g"] * p["w"]),
+            "u_H": nu_H * p["w"],
+            "N_F": centre * weight,
+            "N_R": (1 - centre) * weight,
+            "m_ballast_rear": found["ballast_rear"] * p["m_B"],
+            "m_ballast_front": found["ballast_front"] * p["m_B"],
+        }
+    return found
+
+
+def weave(q):
+    """Zero in Fr² of the Hurwitz determinant over Fr², which is linear in Fr²: from its values at two speeds."""
+
+    def determinant(Fr):
+        a0, a1, a2, a3, a4 = polynomial_60(**{**q, "Fr": mp.mpf(Fr)})
+        return (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4) / Fr**2
+
+    if q["zeta_B"] == q["zeta_H"]:  # a common factor of the determinant, which leaves its zero: go around
+        return weave({**q, "zeta_B": q["zeta_B"] * (1 + mp.mpf(10) ** -25)})
+    one, two = determinant(1), determinant(2)
+    slope = (two - one) / 3
+    if q["chi_B"] == q["chi_H"]:
+        return None  # a3 = 0, and the determinant does not depend on the speed
+    square = 1 - one / slope
+    return mp.sqrt(square) if square >= 0 else None
 
 
 def times(*factors):

@@ -8,15 +8,14 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
+
+from helpers.places import ROOT
 
 if os.name == "posix":
     import fcntl
     import pty
     import struct
     import termios
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @dataclass(frozen=True)

@@ -115,22 +115,24 @@ def digits():
 # The equations
 
 
+def robots(model, kind):
+    """Parameters and gains in fractions, the model with the gains, and all its numbers as balls."""
+    for seed, bicycle in enumerate(bicycles(8, seed=11)):
+        p = rounded(bicycle if model is whipple else {n: bicycle[n] for n in SKATES})
+        gains = gains_of(GAINS[kind], seed)
+        yield p, gains, controlled(model, gains), balls({**p, **dict.fromkeys(STEER, Fraction(0)), **gains})
+
+
 @pytest.mark.parametrize("kind", GAINS)
 def test_wheels_by_the_appendix(kind):
-    for seed, bicycle in enumerate(bicycles(8, seed=11)):
-        p, gains = rounded(bicycle), gains_of(GAINS[kind], seed)
-        model = controlled(whipple, gains)
-        given = balls({**p, **dict.fromkeys(STEER, Fraction(0)), **gains})
+    for p, gains, model, given in robots(whipple, kind):
         agree(model.coefficients(given), characteristic(state_matrix(*wheeled(p), gains, p["v"])))
 
 
 @pytest.mark.parametrize("kind", GAINS)
 def test_skates_in_si_by_the_paper(kind):
     """Roots are per √(g/w) there: the k-th coefficient has k of these."""
-    for seed, bicycle in enumerate(bicycles(8, seed=12)):
-        p, gains = rounded({n: bicycle[n] for n in SKATES}), gains_of(GAINS[kind], seed)
-        model = controlled(tms, gains)
-        given = balls({**p, **dict.fromkeys(STEER, Fraction(0)), **gains})
+    for p, gains, model, given in robots(tms, kind):
         rate = (given["g"] / given["w"]).sqrt()
         got = model.coefficients(given, model.parameter_set("SI"))
         exact = characteristic(state_matrix(*skating(p), gains, p["v"]))
@@ -140,10 +142,7 @@ def test_skates_in_si_by_the_paper(kind):
 @pytest.mark.parametrize("kind", GAINS)
 def test_skates_without_dimensions_are_those_in_si(kind):
     """Torques per m_B g w, times per √(w/g), a slope per Fr = v/√(g w)."""
-    for seed, bicycle in enumerate(bicycles(8, seed=13)):
-        p, gains = rounded({n: bicycle[n] for n in SKATES}), gains_of(GAINS[kind], seed)
-        model = controlled(tms, gains)
-        given = balls({**p, **dict.fromkeys(STEER, Fraction(0)), **gains})
+    for _, _, model, given in robots(tms, kind):
         rate, speed = (given["g"] / given["w"]).sqrt(), (given["g"] * given["w"]).sqrt()
         own = {"tau": given["lag"] * rate} if "lag" in given else {}
         for n in given:
@@ -155,21 +154,6 @@ def test_skates_without_dimensions_are_those_in_si(kind):
         one = model.coefficients(given, model.parameter_set("SI"))
         assert all((a / got[0]).overlaps(b / one[0]) for a, b in zip(got, one, strict=True))
         assert set(model.sets[0].names) == {*from_si(given), *own}
-
-
-@pytest.mark.parametrize("kind", GAINS)
-def test_without_wheels_and_trail_it_is_that_of_skates(kind):
-    absent = {p.name: Fraction(0) for p in whipple.sets[0].parameters if p.default == 0}
-    for seed, bicycle in enumerate(bicycles(4, seed=14)):
-        p = rounded({n: bicycle[n] for n in SKATES})
-        gains = {**dict.fromkeys(STEER, Fraction(0)), **gains_of(GAINS[kind], seed)}
-        given, skates = balls({**p, **gains}), controlled(tms, gains)
-        rate = (given["g"] / given["w"]).sqrt()
-        one = controlled(whipple, gains).coefficients({**balls(absent), **given})
-        other = skates.coefficients(given, skates.parameter_set("SI"))
-        assert all(
-            (a / one[0]).overlaps(b * rate**k / other[0]) for k, (a, b) in enumerate(zip(one, other, strict=True))
-        )
 
 
 @pytest.mark.parametrize("kind", GAINS)

@@ -4,15 +4,14 @@ Nothing of tmsopt has a part in it but the reading of the files.
 """
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.bicycles import abscissa, matrices
+from helpers.places import ROOT
 
 import tmsopt
 
-ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/how_to/real_bicycles.md").read_text(encoding="utf-8")
 DECAY = -0.01  # 1/s, as the page asks
 

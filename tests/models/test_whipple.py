@@ -10,7 +10,7 @@ import flint
 import mpmath
 import numpy as np
 import pytest
-from helpers.bicycles import BENCHMARK, appendix, bicycles
+from helpers.bicycles import BENCHMARK, MATRICES, appendix, bicycles
 from helpers.designs import designs
 from mpmath import mp
 
@@ -22,14 +22,6 @@ from tmsopt.roots import exact_roots, quadratic_pencil
 
 SI = whipple.sets[0]
 NONE = {p.name: 0.0 for p in SI.parameters if p.default == 0}
-MATRICES = (
-    [[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]],
-    [[0, 33.86641391492494], [-0.85035641456978, 1.68540397397560]],
-    [[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]],
-    [[0, 76.59734589573222], [0, 2.65431523794604]],
-)
-"""M, C1, K0, K2 as printed there."""
-
 EIGENVALUES = {
     0: (-3.13164324790656, 3.13164324790656, -5.53094371765393, 5.53094371765393),
     1: (-3.13423125066578, 3.52696170990070 + 0.8077402751993j, -7.11008014637442),

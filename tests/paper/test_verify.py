@@ -6,14 +6,14 @@ import re
 from collections import Counter
 from decimal import ROUND_HALF_EVEN, Decimal
 from fractions import Fraction
-from pathlib import Path
 
 import flint
 import numpy as np
 import pytest
-import sympy
 from click.testing import CliRunner
 from helpers import oracles
+from helpers.bicycles import MATRICES
+from helpers.places import PROBLEMS
 from mpmath import mp
 
 from tmsopt import laws
@@ -33,7 +33,7 @@ from tmsopt.paper.ledger import (
 )
 
 EXACT, HOLDS, OFF, CONDITIONAL, FAILS = VERDICTS
-PAGE = Path(__file__).parents[2] / "problems" / "paper.md"
+PAGE = PROBLEMS / "paper.md"
 ZB, ZH = Fraction(-2, 5), Fraction(-1, 5)
 
 
@@ -277,8 +277,7 @@ def test_other_chi_H_affect_generality(by_key):
 
 def test_the_speed_of_capsize_is_a_closed_form(by_key):
     """Meijaard et al. (2007), Table 2: 6.02426201538837 m/s; here det(g K0 + v² K2), which is affine in v²."""
-    K0 = np.array([[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]])
-    K2 = np.array([[0, 76.59734589573222], [0, 2.65431523794604]])
+    *_, K0, K2 = map(np.array, MATRICES)
     still, moving = (np.linalg.det(9.81 * K0 + square * K2) for square in (0, 1))
     speed = np.sqrt(still / (still - moving))
     assert float(by_key["conclusion-numerical"].computed) == pytest.approx(speed, rel=1e-12)
@@ -293,36 +292,10 @@ def test_a_bicycle_that_is_stable_backward():
     assert not oracles.routh_exact(oracles.polynomial_exact(-design[0], *design[1:]))
 
 
-def test_no_sampled_bicycle_with_chi_H_above_0_is_stable_backward():
-    rng = np.random.default_rng(3)
-    for _ in range(3000):
-        values = [
-            -rng.uniform(0.1, 9),
-            rng.uniform(0.1, 20),
-            rng.uniform(-3, 3),
-            rng.uniform(0, 3),
-            *-rng.uniform(0.05, 2, 2),
-        ]
-        assert not oracles.routh_exact(oracles.polynomial_exact(*values, rng.uniform(-12, 12)))
-
-
 def hand(Fr, T):
     """The bicycle with ζ_B = −2, ζ_H = −1/2, χ_B = 2, χ_H = 1, monic, in fractions."""
     a = oracles.polynomial_exact(Fr, 1, 2, 1, -2, Fraction(-1, 2), T)
     return [c / a[0] for c in a]
-
-
-def test_the_EP4_is_not_where_the_tangent_is_vertical():
-    """With Fr² = 36 T²/(12 T − 2), dFr²/dT = 0 at T = 1/3, where p is no fourth power; the EP4 is at T = 17/48."""
-    T = sympy.Symbol("T")
-    square = 36 * T**2 / (12 * T - 2)
-    assert sympy.solve(sympy.diff(square, T), T) == [0, sympy.Rational(1, 3)]
-    # Fr² = 2 is not a square: b² = (a1/2)², c = 1, and b² + 2 = a2
-    at = [hand(Fraction(k), Fraction(1, 3)) for k in (0, 1)]
-    a1_square, a2 = 2 * at[1][1] ** 2, at[0][2] + 2 * (at[1][2] - at[0][2])
-    assert a2 == a1_square / 4 + 2
-    assert a1_square / 4 != 4
-    assert oracles.exact_multiplicities(hand(Fraction(17, 12), Fraction(17, 48))) == [(4, 1)]
 
 
 def test_the_tangent_of_the_printed_curve_in_the_figure(by_key):
@@ -339,14 +312,6 @@ def test_the_tangent_of_the_printed_curve_in_the_figure(by_key):
         tilt = mp.atan(mp.mpf(15) / 4 - mp.mpf(75) / 32 * mp.sqrt(2))
         assert mp.diff(curve, tilt) > 0.05
         assert abs(curve(turn) - mp.sqrt(5)) < mp.mpf(10) ** -30
-
-
-def test_shallow_bicycles_have_no_pairs_of_double_roots():
-    """tan λ_s = 1/10 is below the pole: heavily damped at ever greater speeds, by the discriminant and certified roots."""
-    for Fr in (2, 10, 1000):
-        roots = oracles.certified_roots(hand(Fraction(Fr), Fraction(1, 10)))
-        assert all(m == 1 and z.imag == 0 and z.real < 0 for z, m in roots)
-    assert oracles.exact_multiplicities(hand(Fraction(3, 2), Fraction(1, 4))) == [(2, 2)]
 
 
 def test_negative_eigenvalues_first_move_apart(by_key):
@@ -366,89 +331,9 @@ def test_negative_eigenvalues_first_move_apart(by_key):
     assert spans[1] > max(spans[0], spans[2])
 
 
-def test_a_heavily_damped_bicycle_can_lean_more_before_it_recovers():
-    """Two modes of the linear system itself, scaled to leans 1 and −1: the lean starts at 0 and grows."""
-    with mp.workdps(30):
-        lean_angle = mp.atan(mp.mpf(1) / 4)
-        M, V, P, _ = oracles.matrices(
-            mp.mpf("1.45"), 1, 2, 1, -2, mp.mpf(-1) / 2, mp.cos(lean_angle), mp.sin(lean_angle)
-        )
-        roots = [z.real for z in oracles.roots_60(hand(Fraction("1.45"), Fraction(1, 4)))]
-        assert all(z < 0 for z in roots)
-        for s in (roots[0], roots[-1]):
-            L = [[M[i][j] * s**2 + V[i][j] * s + P[i][j] for j in range(2)] for i in range(2)]
-            steer = -L[0][0] / L[0][1]  # with lean 1
-            assert abs(L[1][0] + L[1][1] * steer) < mp.mpf(10) ** -20
-        lean = [mp.exp(roots[-1] * t) - mp.exp(roots[0] * t) for t in (0, mp.mpf("0.1"), 200)]
-        assert lean[0] == 0 < lean[2] < lean[1]
-
-
-def test_slow_heavily_damped_bicycles_stand_off_the_plane():
-    """Eigenvalues −6, −4, −3, −1/72 chosen; the design from a1, a2, a3 over a0 in fractions."""
-    x = [Fraction(6), Fraction(4), Fraction(3), Fraction(1, 72)]
-    e1, e3 = sum(x), sum(1 / k for k in x)
-    e2 = (e1**2 - sum(k * k for k in x)) / 2
-    Fr, T = (2 * e2 + 5) / (2 * e1 + e3), 3 * (2 * e2 + 5) / (2 * e1 + e3) ** 2
-    chi_B = 1 + e3 * T / Fr
-    a = oracles.polynomial_exact(Fr, 1, chi_B, 1, -2, Fraction(-1, 2), T)
-    assert [c / a[0] for c in a] == [1, e1, e2, e3, 1]
-    assert Fr < Fraction(4, 3)
-    for k in range(1, 400):  # no tilt does at χ_B = 2
-        roots = oracles.certified_roots(hand(Fr, Fraction(k, 100) ** 2))
-        assert not all(z.imag == 0 and z.real < 0 for z, _ in roots)
-
-
 def test_dp_is_empty_for_lower_rear_mass():
     """ζ_B = −1/2, ζ_H = −2: ω0 = −1, and (tls) in fractions."""
     assert laws.dp(-0.5, -2)[1] == pytest.approx(-17 / 192, rel=1e-14)
-
-
-def test_the_abscissa_below_that_of_the_optimised_benchmark():
-    design = [Fraction(x) for x in ["2.243", "5.82", "1.3366", "1.02", "-0.4", "-0.2", "0.5573"]]
-    roots = oracles.certified_roots(oracles.polynomial_exact(*design))
-    assert max(z.real for z, _ in roots) < -1.2
-
-
-def test_an_exceptional_point_that_is_no_minimum():
-    x = sympy.Symbol("x")
-    assert sympy.solve(
-        sympy.discriminant(sympy.Symbol("s") ** 2 + 2 * x * sympy.Symbol("s") + x**2 + x - 1, sympy.Symbol("s")), x
-    ) == [1]
-    assert max(z.real for z, _ in oracles.certified_roots([1, 4, 5])) < -1
-
-
-# Statements that were proved by exact algebra, by sampling
-
-
-def test_heavy_damping_is_never_steeper_than_the_EP4_or_the_2EP2():
-    """Four random negative roots with product 1 (over |ω0|) fix the tilt and the speed; r = √2."""
-    rng = np.random.default_rng(5)
-    r, h = np.sqrt(2), np.sqrt(2) / 5
-    near = np.exp(rng.normal(scale=rng.choice([0.02, 0.1, 0.3, 1.0], (400000, 1)), size=(400000, 3)))
-    near[::3, 1] = near[::3, 0] * np.exp(rng.normal(scale=1e-2, size=near[::3, 0].shape))
-    x = np.column_stack([near, 1 / near.prod(axis=1)])
-    e1, e3 = x.sum(axis=1), (1 / x).sum(axis=1)
-    e2 = (e1**2 - (x**2).sum(axis=1)) / 2
-    g = r * e1 + e3
-    tilt = (r**2 - 1) * (r * e2 + r**2 + 1) / (h * g**2)
-    speed = (r * e2 + r**2 + 1) / g  # over the square root of 1/h
-    # these are bicycles: their polynomial has the roots
-    for k in range(0, 400000, 40000):
-        chi_B = 1 + e3[k] * tilt[k] * h / speed[k]
-        a = oracles.polynomial_exact(speed[k] / np.sqrt(h), 1, chi_B, 1, -0.4, -0.2, tilt[k])
-        assert np.allclose([float(c / a[0]) * h ** (i / 2) for i, c in enumerate(a)], np.poly(-x[k]), rtol=1e-9)
-    top = (r - 1) * (r**2 + 6 * r + 1) / (16 * h * (r + 1))
-    assert np.all(tilt <= top * (1 + 1e-12))
-    kappa = e3 / e1  # r (χ_B − 1)/(r² − χ_B): below 1 for χ_B < r
-    beside = kappa < 1
-    low = (r**2 - 1) * kappa**2 * (r**2 + 6 * r + 1) / (16 * h * (r + kappa) ** 2)
-    assert np.all(tilt[beside] <= low[beside] * (1 + 1e-12))
-    at_EP4 = (r**2 + 6 * r + 1) / (4 * (r + 1))
-    faster = speed > at_EP4
-    assert faster.sum() > 1000
-    f = speed[faster]
-    U = (r + 1) * (f + np.sqrt(f**2 - r)) / r
-    assert np.all(tilt[faster] <= f * (r - 1) / (2 * U * h) * (1 + 1e-9))
 
 
 def test_the_cusp_is_a_triple_root(by_key):
@@ -463,14 +348,6 @@ def test_the_cusp_is_a_triple_root(by_key):
 
         found = mp.findroot(triple, (2.02, 0.2, -0.94))
         assert abs(found[0] / mp.mpf(by_key["fig2-left"].computed) - 1) < mp.mpf(10) ** -38
-
-
-def test_the_standstill_identity_symbolically():
-    """ζ_H > ζ_B is necessary because a2 < 0 at Fr = 0 where a0, a4 > 0."""
-    expressions, s = oracles.symbolic_copo()
-    a0, a2, a4 = (expressions[k].subs(s["Fr"], 0) for k in (0, 2, 4))
-    mu, B, H = s["mu"], s["zeta_B"], s["zeta_H"]
-    assert sympy.expand(-a2 * (B + mu * H) + a4 * (B**2 + mu * H**2) + a0 * (1 + mu)) == 0
 
 
 def test_the_machine_of_the_photograph_has_an_EP4(by_key):

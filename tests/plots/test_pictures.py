@@ -3,13 +3,13 @@
 import math
 from dataclasses import replace
 from importlib import import_module
-from pathlib import Path
 
 import matplotlib.colors as mcolors
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from helpers.oracles import is_stable_60, polynomial_60, roots_60
+from helpers.places import PROBLEMS
 from matplotlib.collections import LineCollection, QuadMesh
 
 import tmsopt
@@ -410,7 +410,7 @@ def test_one_design_far_away_hides_no_other():
 
 def test_letters_that_no_font_has_cost_no_warning(tmp_path):
     """Drawn as boxes; warnings are errors here."""
-    ax = tmsopt.plots.draw_growth(tmsopt.growth(Path(__file__).parents[2] / "problems" / "whipple_benchmark.toml"))
+    ax = tmsopt.plots.draw_growth(tmsopt.growth(PROBLEMS / "whipple_benchmark.toml"))
     ax.set_title("自行车 \U0001f6b2")
     tmsopt.plots.save(ax, tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 1000

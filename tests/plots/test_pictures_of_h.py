@@ -3,16 +3,16 @@
 import math
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.places import PROBLEMS
 from matplotlib.text import Text
 
 import tmsopt
 from tmsopt import plots
 
-TRIMER = Path(__file__).parents[2] / "problems" / "pt_trimer.toml"
+TRIMER = PROBLEMS / "pt_trimer.toml"
 FOREIGN = re.compile(r"weave|capsize|carrier|heav|(Re|Im)\W*s\b")
 
 

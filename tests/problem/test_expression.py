@@ -359,7 +359,7 @@ WORDS = "sin min max abs pi 1 2.5 1e3 .5 + - * / ** ( ) , <= >= == < != = . [ ] 
 tokens = st.lists(st.sampled_from([*NAMES, *WORDS.split(), "\n", "\x00"]), max_size=12)
 
 
-@settings(max_examples=800, deadline=None, derandomize=True)
+@settings(max_examples=400, deadline=None, derandomize=True)
 @given(tokens, st.sampled_from(["", " "]), st.sampled_from([parse_value, parse_comparison]))
 def test_random_tokens_are_refused_or_can_be_evaluated(parts, space, parse):
     text = space.join(parts)
@@ -372,7 +372,7 @@ def test_random_tokens_are_refused_or_can_be_evaluated(parts, space, parse):
     expression({n: ca.SX.sym(n) for n in NAMES})
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=150, deadline=None, derandomize=True)
 @given(st.text(max_size=30))
 def test_random_text_never_raises_anything_else(text):
     for parse in (parse_value, parse_comparison):

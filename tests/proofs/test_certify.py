@@ -523,12 +523,6 @@ def without_scip(monkeypatch):
     monkeypatch.setattr(certifying, "SOLVER", missing)
 
 
-@pytest.mark.usefixtures("without_scip")
-def test_without_scip_the_error_says_what_to_install(slow_plane):
-    with pytest.raises(InputError, match=r"PySCIPOpt is not installed; pip install 'tmsopt\[certify\]'"):
-        certify(slow_plane)
-
-
 TIMID = GlobalSolver("Timid", "math", "", 0.0, timid.prepare, timid.decide)
 
 
@@ -602,15 +596,6 @@ def test_command_with_a_bad_time(file, seconds):
     code, _, err = run("solve", file, f"--certify={seconds}")
     assert code == 2
     assert ("--certify" if seconds != "-3.5" else "-3") in err  # which click takes for an option
-
-
-def test_command_for_a_front(tmp_path):
-    path = tmp_path / "front.toml"
-    path.write_text(FILE + 'pareto = ["abscissa", "Fr"]\n')
-    code, out, err = run("solve", path, "--certify", "5")
-    assert (code, out) == (2, "")
-    assert "--certify" in err
-    assert "front" in err
 
 
 @pytest.mark.parametrize(

@@ -75,23 +75,6 @@ def test_constraints_choose_among_them():
 
 
 @pytest.mark.slow
-def test_both_exchanged_ep3_of_three_masses():
-    """K = [[μ + 1, −1, 0], [−1, 2, −1], [0, −1, ν + 1]] has a 3-fold λ where 3λ = tr K, 3λ² = minors, λ³ = det K."""
-    problem = tmsopt.load("problems/three_masses.toml")
-    found = all_of(tmsopt.Problem(problem.model, free=problem.free, locate="CEP3"), starts=16).solutions
-    values = [complex(s.parameters["mu_r"], s.parameters["mu_i"]) for s in found]
-    partners = [complex(s.parameters["nu_r"], s.parameters["nu_i"]) for s in found]
-    for mu, nu in zip(values, partners, strict=True):
-        triple = (mu + nu + 4) / 3
-        minors = 2 * (mu + 1) - 1 + 2 * (nu + 1) - 1 + (mu + 1) * (nu + 1)
-        assert minors == pytest.approx(3 * triple**2, abs=1e-11)
-        determinant = (mu + 1) * (2 * (nu + 1) - 1) - (nu + 1)
-        assert determinant == pytest.approx(triple**3, abs=1e-11)
-    assert sorted(values, key=abs) == pytest.approx(sorted(partners, key=abs), abs=1e-11)
-    assert {s.structure for s in found} == {"CEP3"}
-
-
-@pytest.mark.slow
 def test_two_solutions_close_to_each_other_are_not_told_to_more_digits_than_hold():
     """(s + 1)² + (y − 1/2) (y − 0.5000001): rounding of the 1 moves y by 1e-9, for the slope is 1e-7."""
     y = ca.SX.sym("y")
@@ -122,18 +105,6 @@ def test_the_same_is_found_from_other_starts_and_again():
     assert [s.parameters for s in first.solutions] == [s.parameters for s in again.solutions]
     found = [sorted((s.parameters["c1"], s.parameters["c2"]) for s in every.solutions) for every in (first, other)]
     assert np.allclose(*found, atol=1e-11)
-
-
-@pytest.mark.slow
-def test_of_seven_roots():
-    """With the product 2⁷ all meet at −2 alone."""
-    row = [math.comb(7, j) * 2.0**j for j in range(8)]
-    names = [ca.SX.sym(f"y{j}") for j in range(1, 7)]
-    free = {f"y{j}": (0.5 * row[j], 2 * row[j]) for j in range(1, 7)}
-    seven = tmsopt.Problem(model=from_coefficients([1, *names, row[7]]), free=free, locate="EP7")
-    design = tmsopt.solve(seven)
-    assert design.structure == "EP7"
-    assert design.abscissa == pytest.approx(-2, abs=1e-10)
 
 
 @pytest.mark.slow

@@ -94,7 +94,6 @@ def test_the_greatest_over_cases_is_limited():
     assert design.parameters["k"] == pytest.approx(1.5**2 + 0.25 - 0.5, abs=TOLERANCE)
 
 
-@pytest.mark.slow
 def test_the_fastest_case_may_be_another_than_the_worst():
     """Slow, a skate swings fast; fast, it decays slowly."""
     band = {"scenarios": {"Fr": tmsopt.Band(1.2, 2.4, 3)}, "constraints": {"f": "angular_frequency <= 0.7"}}
@@ -201,7 +200,6 @@ def test_a_frequency_of_0_is_the_least_there_is():
     assert (design.value, design.bound.value) == (0, 0)
 
 
-@pytest.mark.slow
 def test_a_chart_has_it():
     plane = asked({n: BOX[n] for n in ("v", "x_B")}, {"lambda_s": 0.2}, constraints=SLOW)
     chart = tmsopt.chart(plane, points=[7, 5], quantities={"f": "frequency"})

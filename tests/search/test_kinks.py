@@ -131,7 +131,6 @@ def test_a_bicycle_with_a_wished_decay(asked, optimum):
         assert own == pytest.approx(-0.3, abs=1e-7)  # simple roots are right to 1e-13 or so
 
 
-@pytest.mark.slow
 def test_a_positive_real_root_has_a_damping_ratio_of_minus_1():
     """s² + 0.2 s + k is unstable for k < 0 alone, with the root −0.1 + √(0.01 − k), at most 0.4 as k ≥ −0.24."""
     k = ca.SX.sym("k")
@@ -140,7 +139,6 @@ def test_a_positive_real_root_has_a_damping_ratio_of_minus_1():
     assert solve(problem).value == pytest.approx(-1.4, abs=TOLERANCE)
 
 
-@pytest.mark.slow
 def test_a_kink_over_the_designs_of_a_pattern():
     """An EP3 at Fr = 2: the value says that it is there, and the pattern is checked by the solution."""
     design = solve(skate(BOX, minimize="abs(Fr - 2)", locate="EP3"))
@@ -148,7 +146,6 @@ def test_a_kink_over_the_designs_of_a_pattern():
     assert design.structure == "EP3"
 
 
-@pytest.mark.slow
 def test_the_least_relaxation_of_a_kink():
     """The abscissa is −1 at least, so |abscissa + 3| ≤ 0.1 must give way by 1.9; an equality before it stays."""
     limits = {"own": "z == 1", "wish": "abs(abscissa + 3) <= 0.1"}

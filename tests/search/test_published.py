@@ -9,19 +9,18 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import casadi as ca
 import mpmath  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 import sympy as sp  # type: ignore[import-untyped]
+from helpers.places import PROBLEMS
 
 import tmsopt
 
 pytestmark = pytest.mark.slow
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 s = sp.Symbol("s")
 TENTH = sp.Rational(1, 10)
 

@@ -273,13 +273,6 @@ def test_the_amount_of_one_limit_is_the_least_by_a_search():
     assert sum(relaxation.amounts.values()) <= 1.5 * max(slowest - 1.2, fastest + 1)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("key", ["equal, above", "slow and stable"])
-def test_each_amount_alone_frees_the_problem(key):
-    for name, amount in failed(key).relaxation.alone.items():
-        assert tmsopt.solve(moved(PROBLEMS[key], {name: amount}), throw=False).status == "optimal"
-
-
 def test_a_bound_that_may_not_move_beyond_what_is_physical():
     """Fr >= 0 always: no amount of Fr.min makes −1 of it."""
     design = tmsopt.solve(problem(constraints={"back": "Fr <= -1"}), throw=False)

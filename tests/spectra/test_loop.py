@@ -2,16 +2,15 @@
 
 import cmath
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.places import PROBLEMS
 
 import tmsopt
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
 from tmsopt.spectra import encircle
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 DIMER, TRIMER, PAIR = (PROBLEMS / f"{name}.toml" for name in ("loss_only_dimer", "pt_trimer", "coupled_pair"))
 
 CEP2 = {"c2": -1.1, "k": 0.18 + 3 * math.sqrt(435) / 100}
@@ -222,14 +221,11 @@ def test_other_free_parameters_keep_their_values():
     assert abs(loop.parameters["d1"]) < 1e-9
 
 
-def test_a_solution_is_the_centre():
+def test_a_solution_is_the_centre_and_json_has_the_numbers():
     solution = tmsopt.solve(DIMER)
-    assert encircle(solution).permutation == (1, 0)
-    assert encircle(solution).parameters == solution.parameters
-
-
-def test_json_has_the_numbers():
-    data = encircle(DIMER).to_json()
+    loop = encircle(solution)
+    assert loop.parameters == solution.parameters
+    data = loop.to_json()
     assert data["permutation"] == [1, 0]
     assert data["phase"] == pytest.approx(math.pi)
     assert [(c["members"], c["turns"]) for c in data["cycles"]] == [([0, 1], 2)]
@@ -267,8 +263,6 @@ def test_wrong_arguments_are_answered_in_words(call, said):
 
 
 def test_a_pattern_that_is_not_found_raises_not_solved():
-    problem = tmsopt.Problem(
-        from_hamiltonian([["d - 1j", "k"], ["k", 0]]), free={"d": (2, 3), "k": (2, 3)}, locate="EP2"
-    )
+    problem = tmsopt.Problem(from_matrices(A=[[-1, "d"], ["k", -2]]), free={"d": (2, 3), "k": (2, 3)}, locate="EP2")
     with pytest.raises(tmsopt.NotSolved):
         encircle(problem)

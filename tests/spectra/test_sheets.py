@@ -4,10 +4,10 @@ import csv
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.places import PROBLEMS
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import tmsopt
@@ -15,7 +15,7 @@ from tmsopt import plots
 from tmsopt.models import from_hamiltonian, from_matrices
 from tmsopt.spectra import sheets
 
-DIMER = Path(__file__).parents[2] / "problems" / "loss_only_dimer.toml"
+DIMER = PROBLEMS / "loss_only_dimer.toml"
 
 
 def dimer(d, k):

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.places import PROBLEMS
 from helpers.rows import assert_same, numbers_in
 
 from tmsopt import Problem, Sampling, Study, load, models, monte_carlo, over_grid, run_study, solve
@@ -17,7 +17,6 @@ from tmsopt.studies import RowTable, Solver, batch_rows, open_store, solve_row, 
 
 judge = import_module("tmsopt.studies.solving")
 SOLVES = import_module("tmsopt.studies.monte_carlo")
-PROBLEMS = Path(__file__).parents[2] / "problems"
 SPREAD = {"chi_B": 0.005, "lambda_s": 0.0087, "Fr": 0.02}
 OWN = models.from_coefficients(["m", "a", "b + 0.1", "c*a", "d/k"], name="own quartic")
 FIXED = {"m": 1.0, "a": 4.0, "b": 6.0, "c": 1.0, "d": 1.0, "k": 1.0}

@@ -115,7 +115,6 @@ def planes():
     return {name: Plane(fixed, free, starts=8) for name, (fixed, free) in EVERY.items()}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize(("which", "inside"), [("stability", stable), ("heavy_damping", damped)])
 def test_exactly_one_side_of_every_arc_is_inside(planes, name, which, inside):
@@ -299,7 +298,6 @@ def test_a_boundary_that_runs_into_infinity_ends_on_a0_zero():
     assert math.tan(near[0].parameters["lambda_s"]) == pytest.approx(0.5, abs=1e-9)
 
 
-@pytest.mark.slow
 def test_a_root_0_and_one_at_infinity_meet_in_a_corner():
     """At chi_H = 1 and lambda_s = 0 both a0 and a4 are 0; stability ends there from two sides."""
     plane = Plane(

@@ -207,7 +207,6 @@ def test_the_least_critical_speed_is_marked_on_the_boundary():
     assert Fr * (1 - 1e-15) <= traced.min() < Fr + 1e-4  # the fold of the curve is one of its points or beside one
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("offset", planes.SECTIONS)
 def test_sections_have_the_weave_boundary_highest_on_the_law(offset):
     """tan lambda_s at the onset of weaving is Fr² (chi_B − 1)(2 − chi_B)/chi_B at these heights: maximal at sqrt(2)."""

@@ -6,7 +6,6 @@ import math
 import re
 from fractions import Fraction
 from math import comb
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -15,6 +14,7 @@ import sympy
 from helpers import curves
 from helpers.curves import certified, distance, epset_Fr, equations, exact_polynomial
 from helpers.oracles import certified_roots, routh_exact
+from helpers.places import PROBLEMS
 from mpmath import mp
 
 from tmsopt import laws
@@ -28,7 +28,7 @@ BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 
 OFF = {"zeta_B": -0.4, "zeta_H": -0.2}
 MIRRORED = {"zeta_B": -0.2, "zeta_H": -0.4}
-EP_SET = Path(__file__).parents[2] / "problems" / "ep_set.toml"
+EP_SET = PROBLEMS / "ep_set.toml"
 SQRT2 = math.sqrt(2)
 TAN_EP4 = 15 / 4 - 75 * SQRT2 / 32  # Table 1
 FR_EP4 = 3 * math.sqrt(110 * SQRT2 - 120) / 8  # Table 1

@@ -110,7 +110,7 @@ def integer_roots(draw):
     return roots
 
 
-@settings(max_examples=120, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True)
 @given(integer_roots(), st.integers(-50, 50).filter(bool), st.integers(-20, 20))
 def test_random_integer_roots_are_named_by_their_exact_multiplicities(roots, leading, power):
     pairs = [[1, -2 * re, re * re + im * im] for re, im in roots if im > 0]
@@ -276,7 +276,7 @@ rationals = st.fractions(min_value=-9, max_value=9, max_denominator=10)
 factor = st.lists(rationals, min_size=2, max_size=3).filter(lambda f: f[0] != 0)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(st.lists(factor, min_size=1, max_size=2), st.sampled_from([1, 2, 3]))
 def test_exact_roots_agree_with_60_digits(factors, power):
     """The roots of the factors by mpmath, without square-free parts; 1e-15 is one rounding error."""

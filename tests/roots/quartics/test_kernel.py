@@ -4,7 +4,6 @@ Roots are judged by the coefficients that they rebuild, in the longest doubles o
 `is_stable` and `real_roots`, which have tests of their own, and against exact arithmetic.
 """
 
-from collections.abc import Callable
 from functools import partial
 from math import comb
 
@@ -33,8 +32,6 @@ JOINTLY_RIGHT = 1e-13
 COUNT = 3000
 DOUBT = [1.0, 0.3927315003875155, 5.90069031723172, -3.420867305216691e-159, 3.61127e-319]
 """Subnormal coefficients have few digits, and so have coefficients rebuilt from any roots."""
-
-Maker = Callable[[np.random.Generator, int], np.ndarray]
 
 
 def expanded(z):
@@ -332,17 +329,17 @@ def on_a_boundary(rng, n):
 
 
 def test_classes_are_those_of_the_definitions():
-    """On 1e5 designs, and near boundaries and exceptional points, where rounding or exact arithmetic decides."""
+    """On 3e4 designs, and near boundaries and exceptional points, where rounding or exact arithmetic decides."""
     rng = np.random.default_rng(3)
     few = [made(f, 20) for f in FAMILIES]  # exact arithmetic takes a tenth of a second for 200 of them
-    designs = np.stack(tms.coefficients(wide_designs(7, 100_000)), axis=-1)
+    designs = np.stack(tms.coefficients(wide_designs(7, 30_000)), axis=-1)
     a = np.concatenate([designs, -designs[:5000], on_a_boundary(rng, 500), made("normal", 5000), *few])
     found = quartic_classes(*a.T)
     kind, count = classes_by_definition(a)
     assert np.array_equal(found.kind, kind)
     assert np.array_equal(found.real_roots, count)
     assert np.array_equal(quartic_is_stable(*a.T), found.kind >= CLASSES.index("stable"))
-    assert min(np.bincount(found.kind, minlength=5)[1:]) > 100  # each class is there
+    assert min(np.bincount(found.kind, minlength=5)[1:]) > 50  # each class is there
     assert 0 < found.doubtful < 2000
 
 
