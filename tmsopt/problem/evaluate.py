@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tmsopt.algebra.arrays import evaluate_on_arrays
 from tmsopt.algebra.formula import Formula, formula, symbol
-from tmsopt.errors import Fault, InputError, input_error
+from tmsopt.errors import Fault, InputError
 from tmsopt.models import Model, ParameterSet, Values
 from tmsopt.models.expression import Expression, ExpressionError
 from tmsopt.models.model import ROOTS
@@ -60,21 +60,6 @@ class ArrayFunction:
             found = find_eigenvalues(self.problem.model, self.problem.parameter_set, columns)
             root_values = describe_eigenvalues(found.eigenvalues, self.problem.model.is_complex)
         return dict(zip(self.names, evaluate_on_arrays(self.formula, {**columns, **root_values}), strict=True))
-
-
-def require_polynomial(problem: Posed) -> Posed:
-    """The problem, if its model has a characteristic polynomial.
-
-    Raises:
-        InputError: for large matrices, and for complex A, M, D, K or coefficients.
-    """
-    if problem.model.polynomial is None:
-        accepted = "A up to 12 × 12, M, D, K and H up to 6 × 6, and complex numbers in H only"
-        can = "locate a pattern, prove it, and list all points with --all"
-        raise input_error(
-            f"needs the characteristic polynomial; accepted here: {accepted}; larger ones: {can}", "model"
-        )
-    return problem
 
 
 def evaluate(problem: Posed, expressions: Iterable[str | Expression], columns: AnyNumbers) -> list[Any]:
