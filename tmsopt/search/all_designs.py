@@ -28,7 +28,7 @@ from tmsopt.records import Array, Table, Tabular, plain
 from tmsopt.roots import composition
 from tmsopt.search.all_points import prove_all_points
 from tmsopt.search.local_search import solve_from
-from tmsopt.search.locate import REACH_OF_CROSSING, has_chains
+from tmsopt.search.locate import REACH_OF_CROSSING, has_chains, has_equalities
 from tmsopt.search.newton import build_square_system, estimate_error, find_zero, make_zero
 from tmsopt.search.solve import solve_any_status
 from tmsopt.search.state import SearchState, Start, clip_to_box, is_close
@@ -211,7 +211,7 @@ def _search_starts(problem: Posed, options: Options) -> tuple[list[_IsolatedDesi
     """Search from many starts; return the solutions found, the most frequent first, and the coverage."""
     progress = options.progress
     begin(progress, "searching", "start")
-    find_ends = _find_chain_ends if has_chains(problem) else _find_factor_ends
+    find_ends = _find_chain_ends if has_chains(problem) and not has_equalities(problem) else _find_factor_ends
     entries = list[_IsolatedDesign]()
     start_count = singular = crossings = 0
     for ends in find_ends(problem, options):

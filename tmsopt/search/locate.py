@@ -59,9 +59,17 @@ class _Found:
 
 def has_chains(problem: Posed) -> bool:
     """Whether a problem asks for a pattern of the user's matrices, and for no quantity of their roots."""
-    is_stated = problem.model.statement is not None and problem.model.pencil is not None
-    asks_roots = any(problem.asks(name) for name in ROOT_NAMES) if is_stated else True
-    return bool(is_stated and problem.locate and problem.free and not (problem.cases or asks_roots))
+    model = problem.model
+    if not (model.statement is not None and model.pencil is not None and problem.locate and problem.free):
+        return False
+    is_sole_task = problem.objective is None and not has_equalities(problem)
+    asks_roots = any(problem.asks(name) for name in ROOT_NAMES)
+    return not problem.cases and (is_sole_task or (model.polynomial is None and not asks_roots))
+
+
+def has_equalities(problem: Posed) -> bool:
+    """Whether a constraint is an equality."""
+    return any(condition.equality for condition in problem.conditions.values())
 
 
 def locate_by_chains(
@@ -93,13 +101,11 @@ def locate_by_chains(
             start_count >= min(_MIN_STARTS, options.starts) and any(not f.violated for f in found)
         ):
             break
-    equalities = any(condition.equality for condition in problem.conditions.values())
-    has_freedom = degrees_of_freedom(problem).count > 0
-    if found and (problem.objective or equalities or (has_freedom and all(f.violated for f in found))):
+    found.sort(key=lambda f: float(np.linalg.norm((f.point.p - first) / family.widths)))
+    has_active_limit = bool(found and found[0].violated) and degrees_of_freedom(problem).count > 0
+    if found and (problem.objective or has_equalities(problem) or has_active_limit):
         return _optimise(problem, family, targets, found, options, start_count)
-    feasible = sorted(
-        (f for f in found if not f.violated), key=lambda f: float(np.linalg.norm((f.point.p - first) / family.widths))
-    )
+    feasible = [f for f in found if not f.violated]
     if not feasible:
         return _fail(problem, first if end is None else end, start_count)
     best, others = feasible[0], [f for f in found if f is not feasible[0]]
