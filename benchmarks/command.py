@@ -48,9 +48,7 @@ SECTIONS = (
     Section("e", "startup", f"{_SPEED}.startup", "start-up and import times, beside Python, NumPy and CasADi"),
     Section("e", "hostile", f"{_SPEED}.hostile", "how long hostile files are read, and in how much memory"),
     Section("e", "explorer", f"{_SPEED}.explorer", "pages of the explorer: size, writing, drawing in Chromium"),
-    Section("e", "waiting", f"{_SPEED}.waiting", "what takes longest, beside an earlier checkout", long=True),
     Section("e", "beside", f"{_SPEED}.beside", "time of a solve, beside an earlier checkout", long=True),
-    Section("e", "counters", f"{_SPEED}.counters", "what one solve does, beside an earlier checkout", long=True),
     Section("f", "growth", f"{_SPEED}.growth", "growth with free parameters and scenarios"),
     Section("h", "tiles", f"{_SPEED}.folders", "charts to a folder; 1e8 designs in bounded memory"),
     Section("i", "systems", f"{_SYSTEMS}.sixfold", "a 6-fold root from random starts, beside HANSO and PyGRANSO"),
@@ -73,7 +71,6 @@ SECTIONS = (
     Section("s", "narrow", f"{_DESIGNS}.narrow_optima", "narrow basins and plateaus: is optimal the best", long=True),
     Section("t", "targets", f"{_DESIGNS}.hard_references", "the best values of the hard problems, kept", long=True),
     Section("u", "statements", "benchmarks.reports.statements", "statements that a closed form can refute", long=True),
-    Section("u", "facts", "benchmarks.reports.facts", "facts of reports, beside an earlier checkout", long=True),
     Section("v", "fresh", "benchmarks.reports.fresh", "fresh random problems, judged independently", long=True),
     Section("w", "equivalence", "benchmarks.reports.equivalence", "answers beside those of a fixed commit", long=True),
 )
