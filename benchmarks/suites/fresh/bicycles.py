@@ -122,7 +122,7 @@ def whipple(
 
 def largest_real_part(p: Mapping[str, float]) -> float:
     """Of the eigenvalues, in 1/s, with a controller whose motor may lag."""
-    forces, lag = [], p.get("lag", 0.0)
+    forces, lag = list[Any](), p.get("lag", 0.0)
     for some in (p, {n: x for n, x in p.items() if not n.startswith("k_")}):
         M, D, K = whipple({"g": 9.81, **some}, np.sin, np.cos)
         forces.append(np.hstack([K, D]))
