@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.reports.designs.remedies import obey
-from benchmarks.suites.statements.remedies import infeasible_files
+from benchmarks.suites.remedies import infeasible_files
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from helpers.bicycles import BODIES, abscissa as abscissa_of
 from helpers.texts import write
 
 import tmsopt
-from benchmarks.judges.whipple import largest_real_part
+from benchmarks.suites.fresh.bicycles import largest_real_part
 from tmsopt.models import inertia_margin
 
 ROBOT = {

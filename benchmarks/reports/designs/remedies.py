@@ -1,7 +1,7 @@
-"""Infeasible problems: whether what the report advises helps, once the text of it is put into the file."""
+"""Infeasible problems: whether the changes that are advised help, once the text of them is put into the file."""
 
-import re
 import tempfile
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,24 +10,19 @@ from tqdm import tqdm
 
 from benchmarks.judges import FEASIBLE, exactly, verdict
 from benchmarks.reports.tables import Asked, median, page, share, table
-from benchmarks.suites.statements.remedies import File, infeasible_files, toml
+from benchmarks.suites.remedies import File, infeasible_files, toml
 from tmsopt import Solution, load, solve
-from tmsopt.analysis import infeasible_sentences
 
 _ROOTS = ("abscissa", "decay", "damping_ratio")
-_CHANGE = re.compile(r"(?P<left>.+?) (?P<sign><=|>=|==) (?P<new>.+?)(?: instead of \S+)? \((?P<name>\w+)(?:, in .+)?\)")
-_RANGE = re.compile(r"(?P<name>\w+) (?P<way>up|down) to (?P<new>.+?) instead of \S+")
-_SPEED = re.compile(r"the (?P<which>least|greatest) (?P<name>\w+) found is (?P<new>.+)$")
-_NEEDS = re.compile(r"(?P<name>\w+) at (?P<way>least|most) (?P<new>[^,()]+?) \(at (?:least|most) .+? is allowed\)")
 
 
 @dataclass(frozen=True)
 class Obeyed:
-    """What became of a file and of the remedies that are printed for it.
+    """What became of a file and of its remedies.
 
     Attributes:
         status: of the file as it is.
-        remedies: line as printed → nothing where it helps, or what it leads to.
+        remedies: what is advised → nothing where it helps, or what it leads to.
     """
 
     name: str
@@ -37,48 +32,25 @@ class Obeyed:
 
 
 def obey(asked: tuple[str, File]) -> Obeyed:
-    """Solve a file, change it as each line of the report says, and solve what that gives."""
+    """Solve a file, change it as each remedy says, and solve what that gives."""
     name, file = asked
     first = _solved(file)
-    if first.status != "infeasible":
-        return Obeyed(name, first.status, first.seconds)
-    found = {}
-    for line in infeasible_sentences(first, full=True):
-        if changed := _changed(file, line):
-            found[line] = _judged(changed, file)
+    advice = first.relaxation.remedies if first.status == "infeasible" and first.relaxation else ()
+    found = {str(dict(written)): _judged(_changed(file, written), file) for written in advice}
     return Obeyed(name, first.status, first.seconds, found)
 
 
-def _changed(file: File, line: str) -> File | None:
-    """A file with what a line advises; None for one without advice."""
+def _changed(file: File, written: Mapping[str, str]) -> File:
+    """A file with limits as they are written: constraints by name, ends of ranges as ``v.max``."""
     parameters, limits = dict(file["parameters"]), dict(file.get("constraints", {}))
-    text, advice = line.strip(), False
-    if found := _SPEED.search(text):
-        parameters[found["name"]], advice = _value(found["new"]), True
-    for found in _NEEDS.finditer(text):
-        _widen(parameters, found["name"], "max" if found["way"] == "least" else "min", found["new"])
-        advice = True
-    for head in ("smallest change found: ", "or alone: "):
-        for part in text.removeprefix(head).split(" and ") if text.startswith(head) else ():
-            if found := _RANGE.fullmatch(part):
-                _widen(parameters, found["name"], "max" if found["way"] == "up" else "min", found["new"])
-            elif found := _CHANGE.fullmatch(part):
-                limits[found["name"]] = f"{found['left']} {found['sign']} {found['new']}"
-            else:
-                raise ValueError(f"cannot be obeyed: {part}")
-            advice = True
-    return file | {"parameters": parameters, "constraints": limits} if advice else None
-
-
-def _widen(parameters: File, name: str, end: str, new: str) -> None:
-    parameters[name] = {**{k: v for k, v in parameters[name].items() if k != "start"}, end: _value(new)}
-
-
-def _value(text: str) -> str | float:
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    for name, text in written.items():
+        parameter, _, end = name.partition(".")
+        if end:
+            kept = {k: v for k, v in parameters[parameter].items() if k != "start"}
+            parameters[parameter] = {**kept, end: text if " " in text else float(text)}
+        else:
+            limits[name] = text
+    return file | {"parameters": parameters, "constraints": limits}
 
 
 def _judged(changed: File, file: File) -> str:
@@ -119,12 +91,12 @@ def report(asked: Asked) -> str:
         some, helped = sum(bool(found.remedies) for found in group), sum(not verdict for verdict in lines)
         rows.append((kind, len(group), some, len(lines), helped, median(found.seconds for found in group)))
     failed = [(found.name, line, said) for found in every for line, said in found.remedies.items() if said]
-    header = ("files", "infeasible", "with a remedy", "remedies printed", "that help", "median time")
+    header = ("files", "infeasible", "with a remedy", "remedies", "that help", "median time")
     return page(
         "Remedies",
         asked,
-        f"**{share(not said for found in every for said in found.remedies.values())}** of the remedies that are "
-        "printed for infeasible problems help.",
+        f"**{share(not said for found in every for said in found.remedies.values())}** of the remedies of "
+        "infeasible problems help.",
         table(header, rows),
         "The text of each is put into the file as it stands and the file is solved again: it must have an optimum that "
         "meets all limits by the independent judge, and a stable one where the file says something of the roots.",

@@ -16,7 +16,7 @@ import tmsopt
 from benchmarks.reports.tables import Asked, page, table
 from benchmarks.suites import HARD_COUNT, hard_problem, random_problem
 from benchmarks.suites.conflicts import conflict
-from benchmarks.suites.narrow_optima import hidden, references
+from benchmarks.suites.narrow_optima import hidden
 from benchmarks.suites.random_systems import random_system
 from benchmarks.suites.varied_designs import varied_problem
 from benchmarks.timing import over_processes
@@ -35,7 +35,7 @@ _HARD_SEEDS = (1, 2, 3)
 _SUITES = {
     "solve": range(200),
     "systems": range(100),
-    "narrow": sorted(references()),
+    "narrow": sorted(hidden()),
     "conflicts": range(50),
     "variety": range(200),
 }
@@ -76,7 +76,7 @@ def problem_of(name: str) -> tmsopt.Problem:
             return varied_problem(first)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "problem.toml"
-        path.write_text(hidden(first).text, encoding="utf-8")
+        path.write_text(hidden()[first].text, encoding="utf-8")
         return tmsopt.load(path)
 
 

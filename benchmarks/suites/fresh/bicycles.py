@@ -6,6 +6,8 @@ Any arithmetic: the functions take numbers, arrays or numbers of 50 digits with 
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 TMS = (
     "-(zeta_H*tan(lambda_s) - chi_H + 1)*zeta_B**2",
     "Fr*(zeta_B*chi_H - zeta_H*chi_B)*zeta_B",
@@ -116,3 +118,17 @@ def whipple(
         stiffness[1][column] = stiffness[1][column] + of(f"k_{lean}") + of(f"k_{lean}_v") * v
     time = p.get("time", 1)  # the unit of time in seconds
     return mass, [[time * x for x in row] for row in damping], [[time**2 * x for x in row] for row in stiffness]
+
+
+def largest_real_part(p: Mapping[str, float]) -> float:
+    """Of the eigenvalues, in 1/s, with a controller whose motor may lag."""
+    forces, lag = [], p.get("lag", 0.0)
+    for some in (p, {n: x for n, x in p.items() if not n.startswith("k_")}):
+        M, D, K = whipple({"g": 9.81, **some}, np.sin, np.cos)
+        forces.append(np.hstack([K, D]))
+    A = np.zeros((5, 5) if lag else (4, 4))
+    A[:2, 2:4] = np.eye(2)
+    A[2:4, :4] = -np.linalg.solve(M, forces[bool(lag)])
+    if lag:
+        A[2:4, 4], A[4, :4], A[4, 4] = np.linalg.inv(M)[:, 1], (forces[1] - forces[0])[1] / lag, -1 / lag
+    return float(np.linalg.eigvals(A).real.max())

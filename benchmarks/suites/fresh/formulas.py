@@ -33,11 +33,16 @@ class Field:
     functions: Mapping[str, Callable[..., Any]]
 
 
+def many_digits() -> Any:
+    """A context of `DIGITS` digits, or of those that are in use where these are more."""
+    return mpmath.workdps(max(DIGITS, mpmath.mp.dps))
+
+
 def _mpmath(name: str) -> Callable[[Any], Any]:
     function = getattr(mpmath, name)
 
     def value(x: Any) -> Any:
-        with mpmath.workdps(DIGITS):
+        with many_digits():
             return function(x)
 
     return value
@@ -45,7 +50,7 @@ def _mpmath(name: str) -> Callable[[Any], Any]:
 
 def exact(text: str | float) -> Any:
     """A decimal, or a double, as it is."""
-    with mpmath.workdps(DIGITS):
+    with many_digits():
         return mpmath.mpf(text)
 
 
@@ -90,13 +95,13 @@ def evaluate(text: str, values: Mapping[str, Any], field: Field) -> Any:
                 return field.functions[name](*map(value, args))
         raise ValueError(f"{text}: {ast.dump(node)}")
 
-    with mpmath.workdps(DIGITS):
+    with many_digits():
         return value(_tree(text))
 
 
 def sides(text: str) -> tuple[str, str, str]:
     """Left side, sign and right side of a limit."""
-    sign = next(s for s in ("<=", ">=") if s in text)
+    sign = next(s for s in ("<=", ">=", "==") if s in text)
     left, right = text.split(sign)
     return left, sign, right
 
@@ -105,7 +110,7 @@ def excess(text: str, values: Mapping[str, Any], field: Field) -> tuple[Any, Any
     """By how much a limit is violated, negative where it holds, and the size of its right side, at least 1."""
     left, sign, right = sides(text)
     a, b = evaluate(left, values, field), evaluate(right, values, field)
-    return (a - b if sign == "<=" else b - a), max(abs(b), 1)
+    return {"<=": a - b, ">=": b - a, "==": abs(a - b)}[sign], max(abs(b), 1)
 
 
 def names(text: str) -> set[str]:

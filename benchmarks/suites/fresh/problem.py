@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.suites.fresh.bicycles import whipple
-from benchmarks.suites.fresh.formulas import DIGITS, FLOATS, MANY_DIGITS, Field, evaluate, exact, excess, names
+from benchmarks.suites.fresh.formulas import FLOATS, MANY_DIGITS, Field, evaluate, exact, excess, many_digits, names
 
 Floats = npt.NDArray[np.float64]
 Entries = tuple[tuple[str, ...], ...]
@@ -162,7 +162,7 @@ def measure(problem: Problem, designs: Floats) -> tuple[Floats, Floats]:
 
 def polynomial(system: System, values: Mapping[str, Any]) -> list[Any]:
     """Coefficients at many digits, descending; of matrices by Faddeev and LeVerrier."""
-    with mpmath.workdps(DIGITS):
+    with many_digits():
         if system.kind == "coefficients":
             return [evaluate(t, values, MANY_DIGITS) for t in system.entries[0][0]]
         return characteristic(matrix_exactly(system, values))
@@ -181,7 +181,7 @@ def characteristic(matrix: Any) -> list[Any]:
 
 def matrix_exactly(system: System, values: Mapping[str, Any]) -> Any:
     """The state matrix at many digits."""
-    with mpmath.workdps(DIGITS):
+    with many_digits():
         if system.kind == "whipple":
             blocks = [mpmath.matrix(x) for x in whipple(values, mpmath.sin, mpmath.cos)]
         else:
@@ -213,7 +213,7 @@ def matrix_exactly(system: System, values: Mapping[str, Any]) -> Any:
 
 def roots_exactly(coefficients: Sequence[Any]) -> list[Any]:
     """Roots to 50 digits, near a multiple root too; one that is exactly k-fold to 72/k, as it is pulled apart first."""
-    with mpmath.workdps(DIGITS):
+    with many_digits():
         try:
             return list(mpmath.polyroots(list(coefficients), maxsteps=300, extraprec=600))
         except mpmath.libmp.NoConvergence:
@@ -233,7 +233,7 @@ class Measured:
 def measure_exactly(problem: Problem, design: Mapping[str, float]) -> Measured:
     """What a design is worth, all its parameters taken as the doubles that a saved file hands over."""
     worst, abscissa, violations = None, -mpmath.inf, dict.fromkeys(problem.limits, 0.0)
-    with mpmath.workdps(DIGITS):
+    with many_digits():
         for case in problem.cases:
             stored = {n: float(text) for n, text in {**problem.fixed, **case}.items()} | {
                 n: design[n] for n in problem.free

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-PROBLEMS = Path(__file__).parents[3] / "problems"
+PROBLEMS = Path(__file__).parents[2] / "problems"
 
 File = dict[str, Any]
 """A problem file as TOML reads it."""
