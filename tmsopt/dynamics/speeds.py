@@ -3,8 +3,7 @@
 import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import flint
@@ -14,13 +13,12 @@ from tmsopt.algebra.balls import rational
 from tmsopt.algebra.formula import fold, formula, symbol
 from tmsopt.algebra.kinds import BALLS
 from tmsopt.boundaries.weighted_design import parameter_faults
-from tmsopt.dynamics.crossings import DIGITS, Crossing, Crossings, Polynomial, Stretch, find_crossings
+from tmsopt.dynamics.crossings import DIGITS, Crossing, Polynomial, Stretch, find_crossings
 from tmsopt.dynamics.eigenvalue_crossings import find_eigenvalue_crossings
 from tmsopt.errors import InputError, input_error, short, suggest
 from tmsopt.models import ParameterSet
 from tmsopt.problem.files import ProblemSource, pose
 from tmsopt.problem.problem import Posed, Problem
-from tmsopt.problem.real_form import has_real_form, real_form
 from tmsopt.problem.solution import Solution
 from tmsopt.progress import Listener, start_steps
 from tmsopt.records import Table, Tabular, plain
@@ -39,7 +37,6 @@ class Speeds(Tabular):
         stable: bands of speeds with all Re s < 0.
         heavily_damped: bands with all s real and negative.
         always: the kinds ``capsize``, ``weave``, ``EP2`` or ``infinity`` that are present at every speed.
-        is_exact: whether every event is found, by exact root isolation; else eigenvalues on a grid show the events.
         marginal: if roots stay on the imaginary axis, the bands with no root right of the axis and only simple roots on
             it. A root 0 that is present at every speed does not count.
         zeros: multiplicity of the root 0 that is present at every speed.
@@ -63,7 +60,11 @@ class Speeds(Tabular):
     always: tuple[str, ...]
     marginal: tuple[Stretch, ...] = ()
     zeros: int = 0
-    is_exact: bool = True
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether every event is found, by exact root isolation; else eigenvalues on a grid show the events."""
+        return self.problem.model.polynomial is not None
 
     @property
     def weave(self) -> tuple[float, ...]:
@@ -148,42 +149,21 @@ def speeds(
         raise input_error(f"unknown parameter '{name}'; {suggest(name, parameter_set.names)}", "parameter")
     parameters = parameters_of(design, posed, name, progress)
     start_steps(progress, "isolating speeds")
-    physical_range = parameter_set[name].range
+    physical_range, is_exact = parameter_set[name].range, nominal.model.polynomial is not None
     try:
         lower, upper = map(
             float, nominal.free.get(name, (physical_range.lower, physical_range.upper)) if between is None else between
         )
-        if not -math.inf < lower < upper <= (math.inf if nominal.model.polynomial else sys.float_info.max):
+        if not -math.inf < lower < upper <= (math.inf if is_exact else sys.float_info.max):
             raise ValueError
     except (TypeError, ValueError):
         message = f"found {short(between)}; accepted: a smaller and a larger number, `--between LOW,HIGH`"
         raise input_error(message, "between") from None
-    if nominal.model.polynomial is not None:
+    if is_exact:
         crossings = find_crossings(coefficients_over(nominal, parameter_set, parameters, name), lower, upper)
-        is_exact = True
     else:
-        crossings, is_exact = _find_complex_crossings(nominal, parameters, name, lower, upper)
-    return Speeds(nominal.problem, name, Table(parameters), lower, upper, **vars(crossings), is_exact=is_exact)
-
-
-def _find_complex_crossings(
-    problem: Posed, parameters: Mapping[str, float], name: str, lower: float, upper: float
-) -> tuple[Crossings, bool]:
-    """Crossings of a model without a polynomial, and whether they are exact, by its real form, or seen on a grid."""
-    others = {n: x for n, x in parameters.items() if n != name}
-    problem = problem.derive(free={name: (lower, upper)}, fixed=others)
-    if has_real_form(problem.model):
-        form = real_form(problem)
-        with suppress(InputError):  # the coefficients are no polynomials in the parameter
-            coefficients = coefficients_over(form.problem, problem.parameter_set, parameters, name)
-            exact = find_crossings(coefficients, lower, upper)
-            found = tuple(
-                replace(c, kind=form.user_name(c.kind), root=form.user_roots([replace(c.root, im=-c.root.im)])[0])
-                for c in exact.found
-                if c.kind not in ("capsize", "infinity")
-            )
-            return replace(exact, found=found, heavily_damped=()), True
-    return find_eigenvalue_crossings(problem, parameters, name, lower, upper), False
+        crossings = find_eigenvalue_crossings(nominal, parameters, name, lower, upper)
+    return Speeds(nominal.problem, name, Table(parameters), lower, upper, **vars(crossings))
 
 
 def stable_speeds(design: Solution) -> tuple[Stretch, ...] | None:

@@ -71,10 +71,10 @@ def certify(design: ProblemSource, *, seconds: float = SECONDS, progress: Listen
     if problem.asks_radius:
         return _add_note(solution, f"no bound: branch and bound does not support {RADIUS}")
     form = real_form(problem)
-    return form.to_user(_bound(form.to_real(solution), seconds, progress), problem)
+    return form.to_user(_prove_bound(form.to_real(solution), seconds, progress), problem)
 
 
-def _bound(solution: Solution, seconds: float, progress: Listener | None) -> Solution:
+def _prove_bound(solution: Solution, seconds: float, progress: Listener | None) -> Solution:
     """The solution of a problem with a polynomial, with the bound that can be proved in the time."""
     problem = solution.problem.posed
     with SolverPool(SOLVER) as pool:
