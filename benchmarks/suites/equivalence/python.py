@@ -46,7 +46,7 @@ def _problem(kind: str, number: int) -> Any:
         "varied": lambda: suites.varied_problem(number),
         "hard": lambda: suites.hard_problem(5 * number + 2),
         "conflicts": lambda: suites.conflict(number).problem,
-        "narrow": lambda: _written(narrow_optima.hidden(3 * number).text),
+        "narrow": lambda: _written(narrow_optima.hidden()[3 * number].text),
         "fresh": lambda: _written(families[number % len(families)](number // len(families)).text),
     }
     return makers[kind]()
