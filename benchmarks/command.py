@@ -72,7 +72,6 @@ SECTIONS = (
     Section("t", "targets", f"{_DESIGNS}.hard_references", "the best values of the hard problems, kept", long=True),
     Section("u", "statements", "benchmarks.reports.statements", "statements that a closed form can refute", long=True),
     Section("v", "fresh", "benchmarks.reports.fresh", "fresh random problems, judged independently", long=True),
-    Section("w", "equivalence", "benchmarks.reports.equivalence", "answers beside those of a fixed commit", long=True),
 )
 """In the order in which they are run."""
 

@@ -122,13 +122,13 @@ def whipple(
 
 def largest_real_part(p: Mapping[str, float]) -> float:
     """Of the eigenvalues, in 1/s, with a controller whose motor may lag."""
-    forces, lag = list[Any](), p.get("lag", 0.0)
-    for some in (p, {n: x for n, x in p.items() if not n.startswith("k_")}):
-        M, D, K = whipple({"g": 9.81, **some}, np.sin, np.cos)
-        forces.append(np.hstack([K, D]))
+    lag, passive = p.get("lag", 0.0), {n: x for n, x in p.items() if not n.startswith("k_")}
+    (M, D, K), (_, damping, stiffness) = (whipple({"g": 9.81, **some}, np.sin, np.cos) for some in (p, passive))
+    active: Any = np.hstack([K, D])
+    forces: Any = np.hstack([stiffness, damping])
     A = np.zeros((5, 5) if lag else (4, 4))
     A[:2, 2:4] = np.eye(2)
-    A[2:4, :4] = -np.linalg.solve(M, forces[bool(lag)])
+    A[2:4, :4] = -np.linalg.solve(M, forces if lag else active)
     if lag:
-        A[2:4, 4], A[4, :4], A[4, 4] = np.linalg.inv(M)[:, 1], (forces[1] - forces[0])[1] / lag, -1 / lag
+        A[2:4, 4], A[4, :4], A[4, 4] = np.linalg.inv(M)[:, 1], (forces - active)[1] / lag, -1 / lag
     return float(np.linalg.eigvals(A).real.max())
