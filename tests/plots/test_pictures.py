@@ -375,12 +375,14 @@ def results(whipple, chart):
         "comparison": tmsopt.compare(ep4),
         "bicycle": ep4,
         "motion": tmsopt.simulate(ep4, lean=5),
+        "loop": tmsopt.encircle("problems/loss_only_dimer.toml", radius=0.1),
+        "petermann": tmsopt.growth("problems/pt_dimer.toml", over="g", petermann=True),
         "ledger": tmsopt.verify(only=["epset*"]),
         "designs": tmsopt.solve_all("problems/ep4_matching.toml"),
     }
 
 
-ELSEWHERE = {"front", "histogram", "swallowtail", "distance"}
+ELSEWHERE = {"front", "histogram", "swallowtail", "distance", "sheets"}
 NAMES = sorted({name.removeprefix("draw_") for name in dir(plots) if name.startswith("draw_")} - ELSEWHERE)
 """Every public picture but those that are tried in other tests."""
 

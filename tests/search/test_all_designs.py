@@ -117,10 +117,6 @@ def test_the_same_is_found_from_other_starts_and_again():
         ({"locate": "EP4"}, "2 free parameters and 3 conditions .*; free more"),
         ({"constraints": {"sum": "c1 + c2 == 1"}}, "isolated solutions; free more"),
         ({"tolerances": {"c1": 0.1}}, "isolated solutions"),
-        (  # what only the roots define
-            {"constraints": {"damped": "damping_ratio >= 0.1"}},
-            "the constraints use damping_ratio, .*accepted: parameters, coefficients, and quantities with a formula",
-        ),
     ],
 )
 def test_problems_without_single_solutions_are_refused(asked, said):

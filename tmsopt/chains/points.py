@@ -9,6 +9,7 @@ so that conditions that a symmetry fulfils for all parameters do no harm.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
@@ -368,7 +369,23 @@ def refine(
     matrices = family.matrices(p)
     seconds = [find_borders(matrices, c.s)[2] / size_at(matrices, c.s) for c in best.chains]
     sensitivity = _measure_sensitivity(best, family.widths)
-    return ExceptionalPoint(p, best.chains, best.error, min(seconds), sensitivity, (steps, step_count))
+    error = best.error if _are_distinct(best.chains, eigenvalues_of(matrices)) else np.inf
+    return ExceptionalPoint(p, best.chains, error, min(seconds), sensitivity, (steps, step_count))
+
+
+def _are_distinct(chains: Sequence[Chain], eigenvalues: Complex) -> bool:
+    """Whether the chains belong to different eigenvalues: near two of them lie as many as both orders together.
+
+    At an eigenvalue of order 3, the equations of two chains of length 2 hold as well.
+    """
+    size = float(np.abs(eigenvalues - eigenvalues.mean()).max()) or 1.0
+    for a, b in combinations(chains, 2):
+        distance, count = abs(a.s - b.s), a.order + b.order
+        reach = distance + size * MAX_BACKWARD_ERROR ** (1 / count)
+        near = np.sort(np.abs(eigenvalues - (a.s + b.s) / 2))[:count]
+        if distance <= _DISTINCT * size or (distance <= _CLOSE[0] * size and near[-1] > reach):
+            return False
+    return True
 
 
 def measure_point(family: Family, targets: Sequence[Target], p: Array) -> ExceptionalPoint | None:

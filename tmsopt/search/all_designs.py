@@ -153,6 +153,8 @@ def solve_all(problem: ProblemSource, *, seconds: float = SECONDS, **options: Un
     if not is_number(seconds):
         raise input_error(f"found {short(seconds)}; accepted: a number of seconds", "seconds")
     _check_isolated(problem)
+    if not has_chains(problem):
+        _build_equations(real_form(problem).problem)
     own_options = make_options(options, defaults=_DEFAULTS)
     begin(own_options.progress, "proving that no design is missed", "s")
     proof = prove_all_points(problem) if seconds > 0 else None
