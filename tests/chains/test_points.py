@@ -57,6 +57,14 @@ def test_where_eigenvectors_do_not_meet_there_is_none(H, free, locate):
     assert found.status != "optimal"
 
 
+def test_an_ep3_is_not_two_ep2():
+    """The equations of both chains hold at the EP3 of a trimer, √2; the fourth eigenvalue stays at 5."""
+    H = [["d1 + 1j*a", 1, 0, 0], [1, 0, 1, 0], [0, 1, "d3 - 1j*b", 0], [0, 0, 0, 5]]
+    free = {"a": (1.3, 1.5), "b": (1.3, 1.5), "d1": (-0.2, 0.2), "d3": (-0.2, 0.2)}
+    problem = tmsopt.Problem(from_hamiltonian(H), free=free, locate="EP2+EP2")
+    assert not tmsopt.solve_all(problem, seconds=0, starts=12).solutions
+
+
 def test_dependent_vectors_are_no_chain():
     """At a simple eigenvalue with x₁ = 0 the values F₀ = 0 and F₁ = −1 are no small change of the matrix away."""
     _, family, targets = point_of([["x", 0], [0, "0.3 - 0.1j"]], {"x": (-1, 1)}, "EP2")
