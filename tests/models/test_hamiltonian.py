@@ -216,3 +216,23 @@ def test_a_carrier_is_no_wider_than_the_eigenfrequencies_ask():
     pair = tmsopt.models.from_hamiltonian([["1j*g", 1], [1, "-1j*g"]])
     problem = tmsopt.Problem(pair, free={"g": (0.99, 1.01)}, minimize="abscissa")
     assert 0.142 < abs(import_module("tmsopt.problem.real_form").real_form(problem.posed).carrier) <= 0.71
+
+
+def test_eigenfrequencies_of_an_optimum_are_those_of_its_matrix():
+    """The search uses a real form with a carrier; what it reports has none."""
+    problem = tmsopt.Problem(
+        from_hamiltonian(DIMER), fixed={**FIXED, "w1": 3.0}, free={"k": (0.1, 2)}, minimize="abscissa"
+    )
+    found = tmsopt.solve(problem)
+    at = found.parameters
+    H = [[at["w1"] - 1j * at["g1"], at["k"]], [at["k"], at["w2"] - 1j * at["g2"]]]
+    every = [complex(z.re, z.im) for z in found.eigenfrequencies]
+    assert np.allclose(sorted(every, key=lambda z: z.real), sorted(of_numpy(H), key=lambda z: z.real), atol=1e-9)
+
+
+def test_the_realised_abscissa_is_that_of_the_stored_parameters():
+    """A double eigenvalue of [[i g, 1], [1, −i g]] with g = 1 + 2⁻⁵⁰ has Im ω = √(g² − 1); doubles would err by 1e-8."""
+    pair = from_hamiltonian([["1j*g", 1], [1, "-1j*g"]])
+    g = 1 + 2.0**-50
+    found = tmsopt.solve(tmsopt.Problem(pair, fixed={"g": g}))
+    assert found.abscissa_realised == pytest.approx(math.sqrt((g - 1) * (g + 1)), rel=1e-12)
