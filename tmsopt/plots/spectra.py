@@ -116,7 +116,7 @@ def draw_sheets(data: Sheets, ax: Axes | None = None, part: str = "real") -> Axe
     space.plot_surface(X, Y, surfaces.real, facecolors=colours.to_rgba(surfaces.imag), **look)
     space.computed_zorder = False  # so that surfaces do not hide the discs
     for z in data.multiple:
-        space.plot(*plane.to_axis(data.parameters), [getattr(z, part)], "o", color=MARK, zorder=9, **EDGE)
+        space.plot(*plane.to_axis(data.parameters)[:, None], [getattr(z, part)], "o", color=MARK, zorder=9, **EDGE)
     labels = _label_parts(data.problem)
     plane.label(space)
     space.set_zlabel(labels.pop(part))
