@@ -84,3 +84,19 @@ def test_resonance_on_a_curve_of_complex_double_roots():
     (branch,) = traced(from_matrices(A=A), free, "CEP2", starts=6)
     (event,) = [e for e in branch.events if e.name == "resonance"]
     assert [event.parameters[n] for n in "rde"] == pytest.approx([0, 0.4**0.5, 0], abs=EXACT)
+
+
+def test_the_order_and_the_abscissa_where_two_ep2_meet():
+    """The PT chain of four, with gain and loss at its ends, has ω⁴ − (2c² + 1 − g²) ω² + c⁴ − g²: ω⁴ at g = c² = 1 + √2.
+
+    Computed eigenvalues are off by 1e-4 there. All eigenfrequencies of the curve nearby are real.
+    """
+    H = [["1j*g", "c", 0, 0], ["c", 0, 1, 0], [0, 1, 0, "c"], [0, 0, "c", "-1j*g"]]
+    free = {"g": (2.3, 2.6), "c": (1.5, 1.6)}
+    branch, event = next(
+        (b, e) for b in traced(from_hamiltonian(H), free, "EP2", starts=2) for e in b.events if "EP" in e.name
+    )
+    assert event.name == "EP4"
+    assert "weave" not in [e.name for e in branch.events]
+    assert [event.parameters[n] for n in "gc"] == pytest.approx([1 + 2**0.5, (1 + 2**0.5) ** 0.5], abs=EXACT)
+    assert branch.abscissa[event.index] == 0

@@ -95,8 +95,9 @@ def _compile(parts: Formula, shape: tuple[int, ...]) -> Callable[[Array], tuple[
     def join(numbers: Array) -> Complex:
         return np.asarray((numbers[..., ::2] + 1j * numbers[..., 1::2]).reshape(*numbers.shape[:-1], *shape))
 
-    def expand(p: Array) -> tuple[Complex, Complex]:
-        column, jacobian = function(p.tolist())
+    @lru_cache(maxsize=8)
+    def expand_at(p: tuple[float, ...]) -> tuple[Complex, Complex]:
+        column, jacobian = function(p)
         entries, slopes = constants.copy(), np.zeros((len(parts.names), len(constants)))
         entries[places] = column.full().ravel()
         rows, columns = map(np.array, jacobian.sparsity().get_triplet())
@@ -104,4 +105,4 @@ def _compile(parts: Formula, shape: tuple[int, ...]) -> Callable[[Array], tuple[
             slopes[columns, places[rows]] = jacobian.nonzeros()
         return join(entries), join(slopes)
 
-    return expand
+    return lambda p: expand_at(tuple(p.tolist()))

@@ -18,6 +18,8 @@ import numpy as np
 
 from tmsopt.records import Array, Complex
 
+_ROUNDING = 64 * float(np.finfo(float).eps)  # of a matrix, relative to its norm
+_MAX_MERGED = 1e-3  # largest distance of eigenvalues that count as one, as a share of the norm; those of an EP4
 MIN_SECOND_VALUE = 1e-10
 """Least second smallest singular value of L(λ), relative to the size of L, for a single eigenvector."""
 
@@ -192,6 +194,25 @@ def linearise(matrices: Any) -> Any:
 def eigenvalues_of(matrices: Complex) -> Complex:
     """The eigenvalues of a matrix polynomial with a regular leading matrix."""
     return np.asarray(np.linalg.eigvals(linearise(matrices)), dtype=complex)
+
+
+def merged_eigenvalues(matrices: Complex) -> Complex:
+    """The eigenvalues; those that rounding cannot tell apart are their mean, and those near the imaginary axis on it.
+
+    At an exceptional point of order k computed eigenvalues are off by the k-th root of the rounding error, but not
+    their mean.
+    """
+    from scipy.linalg import eig
+    from scipy.sparse.csgraph import connected_components
+
+    M = linearise(matrices)
+    s, left, right = eig(M, left=True)
+    conditions = 1 / np.maximum(np.abs(np.sum(left.conj() * right, axis=0)), 1e-300)
+    errors = float(np.linalg.norm(M, 2)) * np.minimum(_ROUNDING * conditions, _MAX_MERGED)
+    _, labels = connected_components(np.abs(s[:, None] - s) <= errors)
+    is_same = labels[:, None] == labels
+    means = is_same @ s / is_same.sum(axis=1)
+    return np.where(np.abs(means.real) <= errors, 1j * means.imag, means)
 
 
 def linearised_slopes(matrices: Complex, slopes: Complex) -> Complex:

@@ -21,7 +21,7 @@ from tmsopt.models.model import ROOTS
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import Pattern
-from tmsopt.roots.chains import MIN_SECOND_VALUE, eigenvalues_of, find_borders, make_chain, size_at
+from tmsopt.roots.chains import MIN_SECOND_VALUE, eigenvalues_of, find_borders, make_chain, merged_eigenvalues, size_at
 from tmsopt.tracing.continuation import Curve, make_curve
 from tmsopt.tracing.solving import project_rows
 
@@ -86,10 +86,7 @@ class ChainSetup:
         rows, multiple_roots = list[Complex](), self.multiple_roots(y)
         counts = [t.order * (1 + both) for t, both in zip(self.targets, conjugates, strict=True)]
         for point, roots in zip(y, multiple_roots, strict=True):
-            try:
-                others = eigenvalues_of(self.family.matrices(self.split(point)[0]))
-            except np.linalg.LinAlgError:
-                others = np.full(self.problem.model.degree, np.nan, dtype=complex)
+            others = _eigenvalues_at(self, point.tobytes())
             row = list[complex]()
             for s, target, both in zip(roots.tolist(), self.targets, conjugates, strict=True):
                 for z in (s, s.conjugate()) if both else (s,):
@@ -137,18 +134,31 @@ class ChainSetup:
         for heights, targets, places in variants:
             for row in _find_minima(heights):
                 starts = [complex(roots[row, places.index(i)]) for i in range(len(targets))]
+                k = next(k for k, t in enumerate(targets) if t not in self.targets)
+                p, wanted, best = self.split(y[row])[0], targets, None
                 with suppress(np.linalg.LinAlgError):
-                    found = refine(self.family, targets, self.split(y[row])[0], starts)
-                    point = self.join(found.p, [found.roots[i] for i in places])
-                    if found.is_found and np.abs(point - y[row]).max() <= _REACH:
-                        changed = next(t for t in targets if t not in self.targets)
-                        yield name_target(changed, self.family.is_complex), point
+                    while (found := refine(self.family, wanted, p, starts)).is_found:
+                        point = self.join(found.p, [found.roots[i] for i in places])
+                        if np.abs(point - y[row]).max() > _REACH:
+                            break
+                        best, p, starts = (wanted[k], point), found.p, list(found.roots)
+                        wanted = [replace(t, order=t.order + (i == k)) for i, t in enumerate(wanted)]
+                if best:  # the highest order
+                    yield name_target(best[0], self.family.is_complex), best[1]
         for row in _find_minima(sizes[:, -1]):
             p, s = self.split(y[row])
             design = self.problem.ordered(dict(zip(self.family.names, p.tolist(), strict=True)))
             crossing = nearest_crossing(self.problem, self.pattern, design, _REACH)
             if is_crossing(self.problem, self.pattern, crossing):
                 yield "crossing", self.join(np.array([crossing[n] for n in self.family.names]), s)
+
+
+@lru_cache(maxsize=2**14)
+def _eigenvalues_at(setup: ChainSetup, data: bytes) -> Complex:
+    try:
+        return merged_eigenvalues(setup.family.matrices(setup.split(np.frombuffer(data))[0]))
+    except np.linalg.LinAlgError:
+        return np.full(setup.problem.model.degree, np.nan, dtype=complex)
 
 
 @lru_cache(maxsize=2**14)

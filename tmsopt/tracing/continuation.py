@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import islice
 from typing import Any, NamedTuple
 
@@ -29,6 +30,7 @@ _UNBOUNDED_RATIO = 4.0
 _REMOTE_SIZE = 100.0  # size of a variable, in units of the scale, above which the steps grow
 _MAX_SIZE = 1e6  # size above which the equations lose their digits, so that the curve ends
 _INFINITE_SIZE = 1e5  # size above which a failed step means infinity; rounding may end the curve before `_MAX_SIZE`
+_KNOWN_STEPS = 1024  # steps that are kept, since `find_zeros` asks for the same ones again
 _SAME_POINT = 1e-7  # relative distance up to which two points count as one
 _LIMIT_ROUNDING = 1e-12  # rounding error of a variable of order 1 on a curve along which it stays at its limit
 CLOSED = "closed"
@@ -177,7 +179,9 @@ def make_curve(
                 jacobians[k] = jacobian.T
         return [values, jacobians]
 
-    def step(y: Array, t: Array, s: float, origin: Array) -> tuple[Array, Array, list[float]]:
+    @lru_cache(maxsize=_KNOWN_STEPS)
+    def step(data: bytes) -> tuple[Array, Array, list[float]]:
+        y, t, origin, (s,) = np.split(np.frombuffer(data), [size, 2 * size, 3 * size])
         z, sizes = y + s * t, list[float]()
         for _ in range(3):
             value, jacobian = evaluate(z)
@@ -199,7 +203,8 @@ def make_curve(
         columns = [np.full((len(y), width), np.nan) for width in (size, size, len(_StepChecks._fields))]
         for k in range(len(y)):
             with suppress(np.linalg.LinAlgError):
-                columns[0][k], columns[1][k], columns[2][k] = step(y[k], t[k], float(s[k, 0]), origin[k])
+                data = np.concatenate([y[k], t[k], origin[k], s[k]]).tobytes()
+                columns[0][k], columns[1][k], columns[2][k] = step(data)
         return columns
 
     return Curve(scale, lower, upper, evaluate_all, advance)
