@@ -212,7 +212,7 @@ def merged_eigenvalues(matrices: Complex) -> Complex:
     _, labels = connected_components(np.abs(s[:, None] - s) <= errors)
     is_same = labels[:, None] == labels
     means = is_same @ s / is_same.sum(axis=1)
-    return np.where(np.abs(means.real) <= errors, 1j * means.imag, means)
+    return np.asarray(np.where(np.abs(means.real) <= errors, 1j * means.imag, means))
 
 
 def linearised_slopes(matrices: Complex, slopes: Complex) -> Complex:
