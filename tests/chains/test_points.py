@@ -118,6 +118,27 @@ def test_a_hermitian_matrix_has_no_point_and_says_so():
     assert "Hermitian" in " ".join(tmsopt.solve(problem, throw=False, starts=2).notes)
 
 
+@pytest.mark.parametrize(
+    ("model", "free", "locate", "value"),
+    [
+        (from_hamiltonian([["2*exp(1j*q)", 1], [1, "2*exp(-1j*q)"]]), {"q": (0.1, 1.4)}, "EP2", math.pi / 6),
+        (
+            from_matrices(M=[[1, 0], [0, 1]], D=[["0.1", 0], [0, "-0.1"]], K=[[1, "e"], ["e", 1]]),
+            {"e": (0.01, 0.5)},
+            "CEP2",
+            0.1 * 0.9975**0.5,
+        ),
+        (from_matrices(M=[[1, 0], [0, 1]], D=[[0, "g"], ["-g", 0]], K=[[-1, 0], [0, -4]]), {"g": (2, 4)}, "CEP2", 3),
+    ],
+    ids=["phases, 2 sin q = 1", "balanced gain and loss", "gyroscopes, (s² + 2)²"],
+)
+def test_one_of_two_conditions_holds_by_symmetry(model, free, locate, value):
+    found = tmsopt.solve(tmsopt.Problem(model, free=free, locate=locate))
+    assert found.parameters[next(iter(free))] == pytest.approx(value, abs=EXACT)
+    assert found.conditions == {"real": 2, "by_symmetry": 1}
+    assert tmsopt.prove(found).proved
+
+
 @pytest.mark.parametrize(("H", "order", "g"), [(PT, 2, 1.0), pytest.param(spin(3), 3, 1.0, marks=pytest.mark.slow)])
 def test_one_parameter_is_enough_and_proved(H, order, g):
     fixed = {"k": 1.0} if H is PT else {}

@@ -1,7 +1,7 @@
 """Decides whether an expression is 0 for all values of its symbols, by normal forms of rational functions.
 
 Each value of a function that is not rational, such as sin x, is an additional unknown. These relations between unknowns
-are used: sin² + cos² = 1, tan = sin/cos, (√x)² = x and |x|² = x². An expression that is 0 for another reason is not
+are used: sin² + cos² = 1, tan = sin/cos, sin(−x) = −sin x, (√x)² = x and |x|² = x². An expression that is 0 for another reason is not
 recognised as 0.
 """
 
@@ -82,6 +82,12 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
         quotient = Quotient(_power(self.numerator, abs(n)), _power(self.denominator, abs(n)))
         return quotient if n >= 0 else 1 / quotient
 
+    @property
+    def is_negative(self) -> bool:
+        """Whether its leading coefficient is negative: of a and −a, one is."""
+        leading = [p.leading_coefficient() for p in (self.numerator, self.denominator) if p]
+        return math.prod(leading, start=1) < 0
+
     def sqrt(self) -> "Quotient":
         """The square root of a square, with positive leading coefficients."""
         return Quotient(self.numerator.sqrt(), self.denominator.sqrt())
@@ -132,7 +138,8 @@ class Field:
                 "sqrt": lambda a: self._apply("sqrt", a, square=lambda: a),
                 "abs": lambda a: self._apply("abs", a, square=lambda: a * a),
                 "sin": self._sine,
-                "tan": lambda a: self._sine(a) / self._apply("cos", a),
+                "cos": self._cosine,
+                "tan": lambda a: self._sine(a) / self._cosine(a),
             },
             self.number,
         )
@@ -189,8 +196,13 @@ class Field:
             self._squares.append((index, square()))
         return unknown
 
+    def _cosine(self, a: Quotient) -> Quotient:
+        return self._apply("cos", -a if a.is_negative else a)
+
     def _sine(self, a: Quotient) -> Quotient:
-        cosine = self._apply("cos", a)
+        if a.is_negative:
+            return -self._sine(-a)
+        cosine = self._cosine(a)
         return self._apply("sin", a, square=lambda: 1 - cosine * cosine)
 
     def _power(self, a: Quotient, b: Quotient) -> Quotient:

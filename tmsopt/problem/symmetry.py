@@ -2,8 +2,9 @@
 
 H′ is a complex H minus its mean eigenfrequency, H − (tr H/n) 1. If a constant regular matrix S exists with
 S H̄′ = H′ S, as for PT symmetry, also with a uniform loss, the characteristic polynomial of H′ is real. If
-S H′ = −H′ S (chiral symmetry), its roots are symmetric about 0. The polynomial of M s² + K without damping is real in
-s². Then some of the conditions for an exceptional point hold for all parameters.
+S H′ = −H′ S (chiral symmetry), its roots are symmetric about 0. The polynomial of real matrices M s² + D s + K is one in
+s² without damping, with gyroscopic forces alone, and with balanced gain and loss. Then some of the conditions for an
+exceptional point hold for all parameters.
 """
 
 from collections.abc import Iterator, Sequence
@@ -82,9 +83,9 @@ def find_symmetry(problem: Posed) -> Symmetry:
     """The symmetries of a problem that has matrices."""
     model = problem.model
     assert model.pencil is not None
-    *others, rows = _evaluate_matrices(problem)
+    *others, rows = matrices = _evaluate_matrices(problem)
     if not model.is_complex:
-        return Symmetry(is_real=len(others) == 2 and all(constant(x).fraction == 0 for row in others[1] for x in row))
+        return Symmetry(is_real=_has_even_polynomial(problem, matrices))
     if len(others) != 1:
         return NONE
     H, mean = centre_matrix(rows)
@@ -100,6 +101,19 @@ def find_symmetry(problem: Posed) -> Symmetry:
         is_chiral=any(_holds(S, H, negative) for S in _candidates(samples, -samples)),
         has_loss=bool(abs(_sample(problem, [[mean]]).imag).max() > 0),
     )
+
+
+def _has_even_polynomial(problem: Posed, matrices: Sequence[Any]) -> bool:
+    """Whether S Pₖ = (−1)ᵏ Pₖ S, or S Pₖᵀ = (−1)ᵏ Pₖ S, for a constant regular S and all Pₖ."""
+    straight = [[[pair(x) for x in row] for row in P] for P in matrices]
+    left = [[[(-1) ** k * x for x in row] for row in P] for k, P in enumerate(straight)]
+    samples = np.concatenate([_sample(problem, P) for P in left])
+    for right in (straight, [[list(column) for column in zip(*P, strict=True)] for P in straight]):
+        right_samples = np.concatenate([_sample(problem, P) for P in right])
+        for S in _candidates(right_samples, samples):
+            if all(_holds(S, *sides) for sides in zip(right, left, strict=True)):
+                return True
+    return False
 
 
 def _evaluate_matrices(problem: Posed) -> Sequence[Any]:
