@@ -72,6 +72,15 @@ def test_critical_damping_of_one_of_eight_oscillators():
     assert branch.stable.all()
 
 
+def test_gyroscopes_have_a_curve_in_two_parameters():
+    """s⁴ + (g² − 1 − k) s² + k has a double pair where g² − 1 − k = 2 √k; the other condition holds by symmetry."""
+    model = from_matrices(M=[[1, 0], [0, 1]], D=[[0, "g"], ["-g", 0]], K=[[-1, 0], [0, "-k"]])
+    (branch,) = traced(model, {"g": (2, 4), "k": (2, 6)}, "CEP2", starts=4)
+    g, k = (branch.parameters[n] for n in "gk")
+    assert np.abs(g**2 - 1 - k - 2 * np.sqrt(k)).max() <= EXACT
+    assert not branch.abscissa.any()
+
+
 def test_resonance_on_a_curve_of_complex_double_roots():
     """Two oscillators with dampers ±d and a spring c = 0.6 between them, all roots moved by −r.
 

@@ -1,8 +1,8 @@
 """Decides whether an expression is 0 for all values of its symbols, by normal forms of rational functions.
 
 Each value of a function that is not rational, such as sin x, is an additional unknown. These relations between unknowns
-are used: sin² + cos² = 1, tan = sin/cos, sin(−x) = −sin x, (√x)² = x and |x|² = x². An expression that is 0 for another reason is not
-recognised as 0.
+are used: sin² + cos² = 1, tan = sin/cos, sin(−x) = −sin x, (√x)² = x and |x|² = x². An expression that is 0 for another
+reason is not recognised as 0.
 """
 
 import math
@@ -85,8 +85,9 @@ class Quotient:  # noqa: PLW1641 - equality up to a common factor has no cheap h
     @property
     def is_negative(self) -> bool:
         """Whether its leading coefficient is negative: of a and −a, one is."""
-        leading = [p.leading_coefficient() for p in (self.numerator, self.denominator) if p]
-        return math.prod(leading, start=1) < 0
+        return bool(self.numerator) and bool(
+            self.numerator.leading_coefficient() * self.denominator.leading_coefficient() < 0
+        )
 
     def sqrt(self) -> "Quotient":
         """The square root of a square, with positive leading coefficients."""

@@ -2,8 +2,8 @@
 
 H′ is a complex H minus its mean eigenfrequency, H − (tr H/n) 1. If a constant regular matrix S exists with
 S H̄′ = H′ S, as for PT symmetry, also with a uniform loss, the characteristic polynomial of H′ is real. If
-S H′ = −H′ S (chiral symmetry), its roots are symmetric about 0. The polynomial of real matrices M s² + D s + K is one in
-s² without damping, with gyroscopic forces alone, and with balanced gain and loss. Then some of the conditions for an
+S H′ = −H′ S (chiral symmetry), its roots are symmetric about 0. Real matrices M s² + D s + K have a polynomial in s²
+without damping, with gyroscopic forces alone, and with balanced gain and loss. Then some of the conditions for an
 exceptional point hold for all parameters.
 """
 

@@ -19,6 +19,7 @@ from tmsopt.errors import input_error
 from tmsopt.models import Values
 from tmsopt.models.model import ROOTS
 from tmsopt.problem.problem import Posed
+from tmsopt.problem.symmetry import count_by_symmetry
 from tmsopt.records import Array, Complex, Truth
 from tmsopt.roots import Pattern
 from tmsopt.roots.chains import MIN_SECOND_VALUE, eigenvalues_of, find_borders, make_chain, merged_eigenvalues, size_at
@@ -213,7 +214,7 @@ def _name_parts(s: Complex, target: Target, is_complex: bool) -> dict[str, Array
 
 def has_chain_curve(problem: Posed) -> bool:
     """Whether the pattern of a problem is traced by Jordan chains."""
-    return problem.model.polynomial is None
+    return problem.model.polynomial is None or count_by_symmetry(problem) > 0
 
 
 def prepare_chains(problem: Posed, pattern: Pattern) -> ChainSetup:
