@@ -174,6 +174,13 @@ def test_the_command_refuses_what_is_no_page(tmp_path, run):
     assert (status, "html" in err) == (2, True)
 
 
+def test_large_matrices_are_referred_to_another_command(tmp_path, run):
+    rows = [["k" if abs(i - j) == 1 else f"{i + 1} - 1j" if i == j else 0 for j in range(7)] for i in range(7)]
+    (tmp_path / "large.toml").write_text(f"[model]\nH = {rows}\n[parameters]\nk = {{min = 0, max = 1}}\n")
+    status, _, err = run("explore", tmp_path / "large.toml")
+    assert (status, "complex H and A up to 6 × 6" in err, "tmsopt sheets" in err) == (2, True, True)
+
+
 def test_the_file_of_a_stated_model_is_kept_as_typed():
     page = tmsopt.explore(PROBLEMS / "coupled_pair.toml")
     typed = tomllib.loads((PROBLEMS / "coupled_pair.toml").read_text(encoding="utf-8"))["model"]

@@ -276,6 +276,7 @@ def test_a_page_is_small_and_its_texts_are_whole():
     """What the documentation promises; and taking blanks out of a script takes none out of its texts."""
     html = tmsopt.explore(PROBLEMS / "whipple_ep4.toml").html
     assert len(html.encode()) < 150_000
+    html += tmsopt.explore(PROBLEMS / "loss_only_dimer.toml").html
     for path in PAGE.glob("*.js"):
         code = re.sub(r"^\s*(//.*|/\*\*.*\*/|\*.*)$| // .*$", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
         texts = re.findall(r'"(?:[^"\\\n]|\\.)*"', re.sub(r"`[^`]*`", "", code))
