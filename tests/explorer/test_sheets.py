@@ -24,7 +24,6 @@ SHADES = """() => {
 """Indices of the colours at the middles of all faces, seen from above."""
 
 
-
 @pytest.mark.parametrize("name", ["loss_only_dimer", "bose_hubbard", "coupled_pair", "transport_aircraft"])
 def test_they_are_the_eigenvalues_of_the_matrices(name):
     solution = tmsopt.solve(PROBLEMS / f"{name}.toml")

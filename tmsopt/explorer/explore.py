@@ -146,12 +146,11 @@ def _write_html(problem: Posed, designs: Sequence[PageDesign], model: Mapping[st
         kernel_script(real_form(problem).problem.model.degree),
         f"const DATA = {_format_json(data)};",
     )
-    names = [*_SCRIPT_NAMES.split(), "bicycle" if is_bicycle(problem) else "sheets", "main"]
-    parts = [*page_scripts, *(_read_minified(f"{name}.js") for name in names)]
+    names = f"{_SCRIPT_NAMES} {'bicycle' if is_bicycle(problem) else 'sheets'} main".split()
     contents = {  # mark in page.html → what replaces it
         "<!-- title -->": escape(problem.title or problem.model.title),
         "/* style */": _STYLE_BLANKS.sub(r"\1\2", _read_minified("page.css")),
-        "/* script */": "\n".join(parts),
+        "/* script */": "\n".join([*page_scripts, *(_read_minified(f"{name}.js") for name in names)]),
     }
     pattern = "|".join(map(re.escape, contents))
     # All marks are replaced at once, because a title may look like a mark.

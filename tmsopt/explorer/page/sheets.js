@@ -47,7 +47,7 @@ function sheetsOf({x, plane}) {
   return keptSheets;
 }
 
-/** The box seen from `view`: pixels of points whose coordinates are from -1 to 1, and signs of the way to the viewer. */
+/** The box seen from `view`: pixels of points with coordinates from -1 to 1, and signs of the way to the viewer. */
 function boxIn(width, height) {
   const [turn, tilt] = [view.turn, view.tilt].map((angle) => (angle * Math.PI) / 180);
   const [cos, sin, high, flat] = [Math.cos(turn), Math.sin(turn), Math.cos(tilt), Math.sin(tilt)];
@@ -56,11 +56,11 @@ function boxIn(width, height) {
     const [x, y, z] = point.map((value, n) => scale * value * BOX[n]);
     return {x: width / 2 + 12 + y * cos - x * sin, y: height / 2 - 1 + (x * cos + y * sin) * flat - z * high};
   };
-  return {pixel, near: [cos < 0 ? -1 : 1, sin < 0 ? -1 : 1]};
+  return {pixel, high, flat, near: [cos < 0 ? -1 : 1, sin < 0 ? -1 : 1]};
 }
 
 /** Draw the back of the box, with numbers and labels along two edges of its floor and along its left edge. */
-function drawBehind(context, {pixel, near: [x, y]}, axes, colours) {
+function drawBehind(context, {pixel, high: upright, flat, near: [x, y]}, axes, colours) {
   const [left, back, right, floor] = [[y, -x], [-x, -y], [-y, x], pixel(0, 0, -1)];
   const line = (...corners) => drawLine(context, corners.map((corner) => pixel(...corner)), colours.line, 1);
   for (const side of [left, back, right]) line([...side, 1], [...side, -1]);
@@ -70,13 +70,16 @@ function drawBehind(context, {pixel, near: [x, y]}, axes, colours) {
   edges.forEach(([from, to], n) => {
     const {label, one, ends: [low, high]} = axes[n];
     const at = (value) => pixel(...from.map((start, m) => start + ((value - low) / (high - low)) * (to[m] - start)));
-    const centre = at((low + high) / 2);
-    const size = Math.hypot(centre.x - floor.x, centre.y - floor.y);
-    const [across, down] = n < 2 ? [(centre.x - floor.x) / size, (centre.y - floor.y) / size] : [-1, 0];
+    const [start, centre, end] = [low, (low + high) / 2, high].map(at);
+    // outwards if seen from above, and downwards if seen from the side
+    const [aside, below] = n < 2 ? [flat * (centre.x - floor.x), centre.y - floor.y + 40 * upright] : [-1, 0];
+    const [across, down] = [aside, below].map((side) => side / Math.hypot(aside, below));
+    const length = Math.hypot(end.x - start.x, end.y - start.y);
     const write = (text, place, away) => context.fillText(text, place.x + away * across, place.y + away * down);
     const aligned = Math.abs(across) < 0.3 ? "center" : across < 0 ? "right" : "left";
     Object.assign(context, {fillStyle: colours.ink, textAlign: aligned});
-    for (const tick of ticksBetween(low / one, high / one, n < 2 ? 4 : 6)) write(figure(tick, 12), at(tick * one), 11);
+    const ticks = length > 25 ? ticksBetween(low / one, high / one, length / (n < 2 ? 32 : 22)) : [];
+    for (const tick of ticks) write(figure(tick, 12), at(tick * one), 11);
     if (n < 2) write(label, centre, 36);
     context.textAlign = "center";
     if (n === 2) drawTurned(context, label, Math.max(9, centre.x - 54), centre.y);
@@ -106,7 +109,9 @@ function drawFaces(context, {near}, pixels, shades, ink) {
 
 /** Both pictures of the sheets: the height is the real or the imaginary part, and the colour shows the other part. */
 function sheetsPicture(host) {
-  let [now, last] = [null, null];
+  let [now, pointer] = [null, null];
+  // the pictures without dots, which are drawn again only if the sheets, the view, the size or the colours change
+  const images = [0, 1].map(() => ({look: "", image: document.createElement("canvas")}));
   const surfaces = [0, 1].map((k) => canvasIn(host, (width) => clamp(280, 0.75 * width, 440), (...on) => paint(k, ...on)));
   const says = surfaces.map(({canvas}) => makeDescriber(canvas));
   const legend = legendIn(host);
@@ -115,21 +120,30 @@ function sheetsPicture(host) {
 
   function paint(k, context, width, height) {
     if (!now) return;
-    const [{plane, x}, {xs, ys, sheets, limits}, colours] = [now.state, sheetsOf(now.state), currentColours()];
+    const [{plane, x}, {key, xs, ys, sheets, limits}, colours] = [now.state, sheetsOf(now.state), currentColours()];
     const [box, labels] = [boxIn(width, height), PART_LABELS.map((label) => withLabelUnit(label, DATA.rootUnit))];
     const axes = plane.map((n) => ({label: parameterLabel(n, width / 4), one: DATA.parameters[n].one, ends: rangeOf(n)}));
     axes.push({label: labels[k], one: 1, ends: limits[k]});
     const share = (value, [low, high]) => (value - low) / (high - low);
     const isInside = (value, n) => value >= axes[n].ends[0] && value <= axes[n].ends[1];
     const pixel = (...at) => at.every(isInside) && box.pixel(...at.map((value, n) => 2 * share(value, axes[n].ends) - 1));
-    const pixels = sheets[k].map((all, at) => all.map((z) => pixel(xs[at % xs.length], ys[Math.floor(at / xs.length)], z[k])));
-    const shade = (z) => SHADES[Math.round(64 * clamp(0, share(z[1 - k], limits[1 - k]), 1))];
-    drawBehind(context, box, axes, colours);
-    drawFaces(context, box, pixels, sheets[k].map((all) => all.map(shade)), colours.ink);
-    SHADES.forEach((colour, n) => drawBox(context, width / 2 + 2 * n - 65, 20, 2.5, 10, colour));
-    Object.assign(context, {fillStyle: colours.ink, textAlign: "center"});
-    context.fillText(`colour: ${labels[1 - k]}`, width / 2, 8);
-    limits[1 - k].forEach((end, right) => context.fillText(figure(end, 3), width / 2 + (right ? 95 : -95), 26));
+    const [{canvas}, kept] = [context, images[k]];
+    const look = [key, view.turn, view.tilt, canvas.width, canvas.height, ...Object.values(colours)].join();
+    if (look === kept.look) context.drawImage(kept.image, 0, 0, width, height);
+    else {
+      const shade = (z) => SHADES[Math.round(64 * clamp(0, share(z[1 - k], limits[1 - k]), 1))];
+      const pixels = sheets[k].map((all, at) => all.map((z) => pixel(xs[at % xs.length], ys[Math.floor(at / xs.length)], z[k])));
+      drawBehind(context, box, axes, colours);
+      drawFaces(context, box, pixels, sheets[k].map((all) => all.map(shade)), colours.ink);
+      SHADES.forEach((colour, n) => drawBox(context, width / 2 + 2 * n - 65, 20, 2.5, 10, colour));
+      Object.assign(context, {fillStyle: colours.ink, textAlign: "center"});
+      context.fillText(`colour: ${labels[1 - k]}`, width / 2, 8);
+      limits[1 - k].forEach((end, right) => context.fillText(figure(end, 3), width / 2 + (right ? 95 : -95), 26));
+      kept.look = look;
+      Object.assign(kept.image, {width: canvas.width, height: canvas.height});
+      kept.image.getContext("2d").drawImage(canvas, 0, 0);
+    }
+    context.textAlign = "center";
     for (const [growth, frequency, times] of now.drawing.meetings) {
       for (const side of OF_H || !frequency ? [1] : [1, -1]) {
         const at = pixel(...plane.map((n) => x[n]), partsOf(growth, side * frequency)[k]);
@@ -147,10 +161,10 @@ function sheetsPicture(host) {
     acceptKeys(canvas);
     // a finger that moves up or down scrolls the page
     Object.assign(canvas.style, {touchAction: "pan-y", cursor: "grab"});
-    on(canvas, "pointerdown", (event) => canvas.setPointerCapture((last = event).pointerId));
+    on(canvas, "pointerdown", (event) => canvas.setPointerCapture((pointer = event).pointerId));
     on(canvas, "pointermove", (event) => {
-      if (event.buttons) turn((event.clientX - last.clientX) / 2, (event.clientY - last.clientY) / 2);
-      last = event;
+      if (event.buttons) turn((event.clientX - pointer.clientX) / 2, (event.clientY - pointer.clientY) / 2);
+      pointer = event;
     });
     on(canvas, "keydown", (event) => {
       if (!TURNS[event.key] || event.altKey || event.ctrlKey || event.metaKey) return;
