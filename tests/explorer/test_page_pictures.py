@@ -74,6 +74,17 @@ def plot_of(page, panel):
     return np.array([box["x"] + x0, box["y"] + y0]), np.array([width, height])
 
 
+def drag(page, panel, *shares):
+    """Press at the first place of a plot, move to the others, and let go; places as shares of width and depth."""
+    corner, size = plot_of(page, panel)
+    for k, share in enumerate(shares):
+        page.mouse.move(*(corner + share * size))
+        if not k:
+            page.mouse.down()
+    page.mouse.up()
+    drawn(page)
+
+
 def wait_until(page, condition):
     """Ten seconds at most; the page forbids the text that Playwright's own way would run."""
     for _ in range(200):
@@ -123,13 +134,7 @@ def test_a_drag_on_the_chart_sets_the_parameters_of_its_place_in_one_step(show):
         before = page.evaluate("[...state.x]")
         i, j = page.evaluate("state.plane")
         (low_i, high_i), (low_j, high_j) = page.evaluate("state.plane.map(rangeOf)")
-        corner, size = plot_of(page, "chart")
-        for share in ([0.2, 0.3], [0.25, 0.5], [0.75, 0.4]):
-            page.mouse.move(*(corner + np.array(share) * size))
-            if share[0] == 0.2:
-                page.mouse.down()
-        page.mouse.up()
-        drawn(page)
+        drag(page, "chart", [0.2, 0.3], [0.25, 0.5], [0.75, 0.4])
         after = page.evaluate("[...state.x]")
         # a pointer stands on whole pixels, and there are more than 200 of them along each axis
         assert after[i] == pytest.approx(low_i + 0.75 * (high_i - low_i), abs=0.005 * (high_i - low_i))
@@ -213,11 +218,7 @@ def test_tiny_numbers_are_told_from_0(show):
 def test_the_line_of_the_growth_plot_can_be_dragged_and_moved_by_keys(show):
     with show("whipple_benchmark") as page:
         low, high = page.evaluate("rangeOf(state.over)")
-        corner, size = plot_of(page, "growth")
-        page.mouse.move(*(corner + [0.5, 0.5] * size))
-        page.mouse.down()
-        page.mouse.move(*(corner + [0.25, 0.5] * size))
-        page.mouse.up()
+        drag(page, "growth", [0.5, 0.5], [0.25, 0.5])
         dragged = page.evaluate("state.x[state.over]")
         assert dragged == pytest.approx(low + 0.25 * (high - low), abs=0.005 * (high - low))
         page.focus("#growth canvas")
@@ -247,20 +248,6 @@ def test_the_bicycle_is_to_scale_and_moves_as_a_body(show, made, name):
     assert np.linalg.norm(leaned) == pytest.approx(np.linalg.norm(B), rel=1e-12)
     assert leaned[1] > 0  # a lean to the right, of what stands above the ground
     assert ahead[1] > 0  # a steer to the right
-
-
-def test_motion_waits_where_the_reader_wants_none(show):
-    with show("whipple_benchmark", reduced_motion="reduce") as page:
-        page.wait_for_timeout(1200)
-        assert page.evaluate("clock.time") == 0
-        press(page, "Play")
-        wait_until(page, "clock.time > 0.2")
-        press(page, "Pause")
-        paused = page.evaluate("clock.time")
-        page.wait_for_timeout(200)
-        assert page.evaluate("clock.time") == paused
-    with show("whipple_benchmark") as page:
-        wait_until(page, "clock.time > 0.2")
 
 
 def test_time_of_the_motion_is_real(show):
@@ -297,15 +284,15 @@ def test_pictures_stand_undefined_designs(show, layer):
 def test_a_model_of_one_parameter_has_no_chart_and_says_so(show):
     with show(ALONE) as page:
         assert "needs two parameters" in page.inner_text("#chart")
+        assert not page.locator("#sheets").count()
         assert page.is_visible("#growth canvas")
 
 
 def test_pictures_say_what_they_show(show):
     with show("whipple_benchmark") as page:
         pictures = page.locator("canvas[aria-label]")
-        assert pictures.count() == 6
-        for k in range(6):
-            assert len(pictures.nth(k).get_attribute("aria-label")) > 40
+        told = pictures.evaluate_all("(all) => all.map((c) => [c.tabIndex, c.role, c.ariaLabel.length > 40])")
+        assert sorted(told) == [[-1, "img", True]] * 3 + [[0, "application", True]] * 3
         assert "is stable" in page.get_attribute("#chart canvas", "aria-label")
         page.evaluate("change({x: [[state.over, 3]]})")
         page.wait_for_timeout(900)
@@ -383,9 +370,3 @@ def test_unstable_classes_are_told_apart_in_the_dark(show):
     linear = {words: np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) for words, c in colours.items()}
     weave, capsize = (linear[f"unstable by {kind}"] @ [0.2126, 0.7152, 0.0722] + 0.05 for kind in ("weave", "capsize"))
     assert capsize >= 2 * weave
-
-
-def test_pictures_with_keys_are_no_mere_images(show):
-    with show("ep4") as page:
-        roles = page.evaluate("[...document.querySelectorAll('canvas[aria-label]')].map((c) => [c.tabIndex, c.role])")
-        assert sorted(roles) == [[-1, "img"]] * 3 + [[0, "application"]] * 3

@@ -250,7 +250,7 @@ def test_results_are_written_for_every_kind(kind, tmp_path):
     written = re.search(r"^const DATA = (.*);$", page_of(design), re.MULTILINE)
     assert written is not None
     data = json.loads(written[1])
-    assert data["bicycle"] == problem.model.name  # it is drawn
+    assert data["bicycle"]  # it is drawn
     assert [known["name"] for known in data["designs"]] == ["optimum", "benchmark"]
     values = dict(zip(problem.posed.parameter_set.names, data["designs"][0]["values"], strict=True))
     lines = "".join(f"{name} = {value!r}\n" for name, value in values.items())

@@ -57,19 +57,16 @@ def list_designs(
         search: whether to search for an exceptional point if the solution is stable and has none.
         more_designs: names and parameters of further designs that solve the problem.
     """
-    nominal = problem.nominal
-    further_designs = [
+    designs = [] if solution is None else [_describe_solution(solution)]
+    designs += [
         PageDesign(name, values, _compute_structure(problem, values), (), True) for name, values in more_designs
     ]
-    designs = [*([] if solution is None else [_describe_solution(solution)]), *further_designs]
     if search and (solution is None or (solution.stable and "EP" not in solution.structure)):
         designs += _find_exceptional_point(problem)
     return [
         design
         if design.meetings
-        else replace(
-            design, meetings=meetings(nominal, design.parameters, nominal.values(design.parameters)["structure"].roots)
-        )
+        else replace(design, meetings=meetings(problem.nominal, design.parameters, design.structure.roots))
         for design in [*designs, *_find_benchmark(problem)]
     ]
 

@@ -12,7 +12,7 @@ from typing import Any, Unpack
 
 from tmsopt.errors import input_error
 from tmsopt.explorer.designs import PageDesign, list_designs
-from tmsopt.explorer.javascript import kernel_script, model_script
+from tmsopt.explorer.javascript import is_bicycle, kernel_script, model_script
 from tmsopt.explorer.page_data import make_page_data
 from tmsopt.files import as_path, write_text
 from tmsopt.problem import Posed, Problem, ProblemSource, Solution, pose
@@ -29,9 +29,9 @@ _ENDINGS = (".html", ".htm")
 _COMMENT = re.compile(r"^//.*$|^/\*\*[\s\S]*?\*/$", re.MULTILINE)  # a comment on lines of its own
 _STYLE_BLANKS = re.compile(r"\s*([{};,])\s*|(:)\s+")  # blanks that have no meaning in a style sheet
 _TEXT = re.compile(r'("(?:[^"\\]|\\.)*")')  # a text in double quotes
-_OPERATOR_BLANKS = re.compile(r" ?([=!]==|=>|\*=|[<>]=?|[?:|&*]{1,2}|[-+]=|[=,;{}()\[\]]) ?| ([-+]) (?![-+])")
+_OPERATOR_BLANKS = re.compile(r" ?([=!]==|=>|\*=|[<>]=?|[?:|&*]{1,2}|[-+]=|[=,;{}()\[\]]) ?| ([-+/%]) (?![-+])")
 """Operators of a script with the blanks around them."""
-_SCRIPT_NAMES = "numerics state axes chart plane growth bicycle motion controls facts api main"
+_SCRIPT_NAMES = "numerics state axes chart plane growth motion controls facts api"
 
 
 @dataclass(frozen=True, repr=False)
@@ -146,11 +146,11 @@ def _write_html(problem: Posed, designs: Sequence[PageDesign], model: Mapping[st
         kernel_script(real_form(problem).problem.model.degree),
         f"const DATA = {_format_json(data)};",
     )
-    parts = [*page_scripts, *(_read_minified(f"{name}.js") for name in _SCRIPT_NAMES.split())]
+    names = f"{_SCRIPT_NAMES} {'bicycle' if is_bicycle(problem) else 'sheets'} main".split()
     contents = {  # mark in page.html → what replaces it
         "<!-- title -->": escape(problem.title or problem.model.title),
         "/* style */": _STYLE_BLANKS.sub(r"\1\2", _read_minified("page.css")),
-        "/* script */": "\n".join(parts),
+        "/* script */": "\n".join([*page_scripts, *(_read_minified(f"{name}.js") for name in names)]),
     }
     pattern = "|".join(map(re.escape, contents))
     # All marks are replaced at once, because a title may look like a mark.

@@ -55,7 +55,7 @@ def make_page_data(
         "title": problem.title,
         "model": problem.model.name,
         "modelTitle": ": ".join(filter(None, (problem.model.title, problem.model.omits))),
-        "bicycle": problem.model.name if is_bicycle(problem) else None,
+        "bicycle": is_bicycle(problem),
         "impulseUnit": _IMPULSE_UNIT if parameter_set.torque is None else "N·m·s",
         "words": dict(words_of(problem.model)),
         "rootUnit": unit_of(problem, "abscissa").text,

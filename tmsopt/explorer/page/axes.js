@@ -304,10 +304,15 @@ function drawAxes(context, plot, x, y, colours) {
   context.strokeRect(Math.round(x0) + 0.5, Math.round(y0) + 0.5, Math.round(width) - 1, Math.round(height) - 1);
   context.textAlign = "center";
   context.fillText(x.label, x0 + width / 2, y0 + height + 30);
+  drawTurned(context, y.label, 9, y0 + height / 2);
+}
+
+/** The label of a vertical axis. */
+function drawTurned(context, label, x, y) {
   context.save();
-  context.translate(9, y0 + height / 2);
+  context.translate(x, y);
   context.rotate(-Math.PI / 2);
-  context.fillText(y.label, 0, 0);
+  context.fillText(label, 0, 0);
   context.restore();
 }
 

@@ -115,11 +115,6 @@ function bicycleLines(shape, travelled) {
 
 /** The bicycle in motion. */
 function bicyclePicture(host) {
-  if (!DATA.bicycle) {
-    const panel = host.closest("section") || host;
-    panel.hidden = true;
-    return {draw() {}};
-  }
   const calm = matchMedia("(prefers-reduced-motion: reduce)");
   let now = null;
   let lastMoment = 0;

@@ -13,7 +13,8 @@ window.measured = {all: NaN};
 
 /** Make the pictures in their panels, and return functions that draw them. An error is shown in its panel. */
 function pictures() {
-  const makers = {chart: chartPicture, plane: planePicture, growth: growthPicture, bicycle: bicyclePicture, motion: motionPicture};
+  const own = by("sheets") ? {sheets: sheetsPicture} : DATA.bicycle && {bicycle: bicyclePicture};
+  const makers = {chart: chartPicture, plane: planePicture, growth: growthPicture, ...own, motion: motionPicture};
   return Object.entries(makers).map(([name, make]) => {
     const panel = by(name);
     const host = panel.appendChild(element("div", {className: "body"}));
