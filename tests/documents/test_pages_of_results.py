@@ -505,6 +505,14 @@ def test_a_design_so_far_has_a_page(tmp_path):
         assert said in save(replace(design(), status=status, interrupted=True, bound=tmsopt.Bound()), tmp_path)
 
 
+def test_large_matrices_have_a_page_without_the_explorer(tmp_path):
+    rows = [[str(i + 2) if i == j else 0 for j in range(7)] for i in range(7)]
+    rows[0][:2], rows[1][:2] = ["d + 1j*g", 1], [1, "-1j*g"]
+    model = tmsopt.models.from_hamiltonian(rows)
+    point = tmsopt.solve(tmsopt.Problem(model, free={"d": (-0.5, 0.7), "g": (0.5, 2.0)}, locate="EP2"))
+    assert "Move a parameter" not in save(point, tmp_path)
+
+
 # In a browser
 
 

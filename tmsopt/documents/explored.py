@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tmsopt.models import in_words_of
 from tmsopt.problem import Posed, Solution, pose, unit_at
+from tmsopt.problem.real_form import has_real_form
 
 if TYPE_CHECKING:
     from tmsopt.charts import Chart
@@ -24,13 +25,13 @@ _MAX_BUTTONS = 8
 
 
 def frame_explorer(result: Any, design: Solution | None) -> str:
-    """Return the explorer in an isolated frame; empty for a result without a problem."""
+    """Return the explorer in an isolated frame; empty for a result without a problem, and for large matrices."""
     base, designs = find_designs(result, design)
-    if base is None:
+    problem: Any = getattr(base, "problem", None) or base
+    if base is None or not has_real_form(problem.model):
         return ""
     from tmsopt.explorer import frame, page_of
 
-    problem: Any = getattr(base, "problem", None) or base
     of_H = problem.model.is_complex
     roots, side = ("eigenfrequencies", "below the real axis") if of_H else ("roots", "left of the imaginary axis")
     return (
