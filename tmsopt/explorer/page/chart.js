@@ -281,7 +281,7 @@ function chartPicture(host) {
       if (!entries.some(({words}) => words === look.words))
         entries.push(lineEntry(look.words, look.colour, look.width, look.dash));
     }
-    entries.push(dotEntry("this design", "", colours.ink));
+    entries.push(dotEntry(`this ${NOUN}`, "", colours.ink));
     if (DATA.curves.length && !curves.length) {
       const {axes, along = []} = DATA.curves[0];
       const others = sameBeside(now.state.x, DATA.start, [...axes, ...along], 1e-12) ? "axes" : "values";
@@ -338,8 +338,8 @@ function chartPicture(host) {
       const [first, second] = state.plane.map((k) => `${symbolOf(k)} ${valueText(k, state.x[k], 3)}`);
       const classes = (surveyed.present || []).map((kind) => classWords(kind)).join("; ");
       says(
-        `Stability chart: this design, ${first} and ${second}, is ${designWords(drawing.kind, drawing.meetings, drawing.known)}; ` +
-          `in the picture are ${classes}. Arrow keys move the design.`,
+        `Stability chart: this ${NOUN}, ${first} and ${second}, is ${designWords(drawing.kind, drawing.meetings, drawing.known)}; ` +
+          `in the picture are ${classes}. Arrow keys move the ${NOUN}.`,
       );
     },
   };

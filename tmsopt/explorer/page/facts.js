@@ -199,6 +199,6 @@ function knownPanel(host) {
   host.append(element("div", {className: "designs"}, ...articles), ...DATA.shown.map((sentence) => element("p", {}, sentence)), now);
   return ({known}) => {
     articles.forEach((article, k) => article.classList.toggle("now", DATA.designs[k] === known));
-    now.textContent = known ? `Shown now: ${known.name}.` : "The design shown now is none of these.";
+    now.textContent = known ? `Shown now: ${known.name}.` : `The ${NOUN} shown now is none of these.`;
   };
 }

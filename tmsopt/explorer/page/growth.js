@@ -373,7 +373,7 @@ function growthPicture(host) {
     const texts = fates.size > 1 ? [] : [`${[...fates][0]} throughout`];
     texts.push(...events.filter(({kind}) => kind !== "meeting").map((event) => eventWords(event, over)));
     // no sweep hits exactly the values where several roots meet, so these come from known designs
-    const own = {name: "this design", at: state.x[over], roots: drawing.meetings};
+    const own = {name: `this ${NOUN}`, at: state.x[over], roots: drawing.meetings};
     const exact = [...known.filter(({at}) => at !== own.at), own].flatMap(({name, at, roots}) =>
       roots.filter((root) => root[2] > 1 && at >= ends[0] && at <= ends[1]).map((root) => ({name, at, root})),
     );
@@ -448,8 +448,8 @@ function growthPicture(host) {
       met("crossing") && lineEntry(`${OF_H ? `an eigenfrequency crosses ${AXIS}` : "a root crosses 0 or infinity"}, unstable before and after`, colours.faint, 1.3, DASHES.dots),
       (met("meeting") || sweep.known.some(({roots}) => hasMeeting(roots))) && dotEntry(`${ROOTS} meet`, colours.paper, colours.ink),
       now.state.x[now.state.over] === withinRange(now.state.over, now.state.x[now.state.over])
-        ? lineEntry("this design: drag it", colours.mark, 1.6, DASHES.whole)
-        : lineEntry("this design is outside of this range", colours.paper, 0, DASHES.whole),
+        ? lineEntry(`this ${NOUN}: drag it`, colours.mark, 1.6, DASHES.whole)
+        : lineEntry(`this ${NOUN} is outside of this range`, colours.paper, 0, DASHES.whole),
     ].filter(Boolean);
   }
 
@@ -486,7 +486,7 @@ function growthPicture(host) {
       surface.repaint();
       const {name} = DATA.parameters[state.over];
       says(
-        `Growth rates and frequencies over ${name}; this design at ${valueText(state.over, state.x[state.over])} is ` +
+        `Growth rates and frequencies over ${name}; this ${NOUN} at ${valueText(state.over, state.x[state.over])} is ` +
           `${designWords(drawing.kind, drawing.meetings, drawing.known)}. ${happens.textContent} ` +
           `Left and right arrow keys move ${name}.`,
       );

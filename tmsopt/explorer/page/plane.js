@@ -120,7 +120,7 @@ function planePicture(host) {
     const {name} = DATA.parameters[state.over];
     const [low, high] = rangeOf(state.over).map((end) => valueText(state.over, end));
     legend([
-      dotEntry(`${ROOTS} of this design`, colours.mark, colours.paper),
+      dotEntry(`${ROOTS} of this ${NOUN}`, colours.mark, colours.paper),
       lineEntry(`at lower ${name}, from ${low}`, colours.complex, 3.2, DASHES.dots),
       lineEntry(`at higher ${name}, to ${high}`, colours.real, 2.4, DASHES.whole),
     ]);
@@ -129,7 +129,7 @@ function planePicture(host) {
       ? beyond
         ? `Beyond the picture: ${beyond}`
         : ""
-      : `This design has no ${ROOTS}: its leading coefficient is 0 or not a number.`;
+      : `This ${NOUN} has no ${ROOTS}: its leading coefficient is 0 or not a number.`;
     reading.hidden = !reading.textContent;
   }
 

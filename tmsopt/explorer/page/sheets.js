@@ -178,8 +178,8 @@ function sheetsPicture(host) {
       now = {state, drawing};
       turn(0, 0);
       const {mark, paper} = currentColours();
-      legend([dotEntry(`${ROOTS} of this design`, mark, paper)]);
-      const own = `${ROOTS} of this design: ${rootsInWords(drawing.meetings) || "none"}`;
+      legend([dotEntry(`${ROOTS} of this ${NOUN}`, mark, paper)]);
+      const own = `${ROOTS} of this ${NOUN}: ${rootsInWords(drawing.meetings) || "none"}`;
       const over = state.plane.map(symbolOf).join(" and ");
       says.forEach((say, k) => say(`Riemann sheets: ${PART_LABELS[k]} over ${over}; ${own}. Arrow keys turn the picture.`));
     },

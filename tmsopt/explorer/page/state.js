@@ -4,10 +4,10 @@
 const STARTS = {lean: 5, push: 0};
 // whether roots are eigenfrequencies of a complex H: [Im ω, Re ω, multiplicity], without conjugates
 const OF_H = DATA.carrier !== null;
-// names of the largest growth rate, of the roots, and of the line between decay and growth
-const [ABSCISSA, ROOTS, AXIS] = OF_H
-  ? ["largest Im ω", "eigenfrequencies", "the real axis"]
-  : ["abscissa", "roots", "the imaginary axis"];
+// names of the largest growth rate, of the roots, of the line between decay and growth, and of the parameters as a whole
+const [ABSCISSA, ROOTS, AXIS, NOUN] = OF_H
+  ? ["largest Im ω", "eigenfrequencies", "the real axis", "point"]
+  : ["abscissa", "roots", "the imaginary axis", "design"];
 const LAYERS = {kind: "stability", abscissa: ABSCISSA, ...(OF_H ? {} : {damping: "damping ratio"})};
 const state = startingState();
 const steps = {past: [], future: [], before: null};
