@@ -11,14 +11,12 @@ import flint
 import mpmath
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from helpers.oracles import ep4_of_heights, polynomial_60, roots_60
 from helpers.skates import FIXED
 from mpmath import mp
 
 import tmsopt
 from tmsopt.analysis import Response, diagnose_roots
-from tmsopt.cli import command_group as main
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices, tms
 from tmsopt.roots import Root, Structure, jordan, structure
 
@@ -141,19 +139,6 @@ def test_six_uncoupled_oscillators_with_critical_damping():
     law = response(found, "c").laws[0].branches
     assert (law.roots, str(law.exponent)) == (12, "1/2")
     assert law.constants == pytest.approx([2] * 6, rel=1e-10)
-
-
-def test_the_sixfold_root_of_two_masses_and_a_controller():
-    """(s⁴ + 2s²)(x0 + x1 s + s²) + y0 + y1 s + y2 s² = (s + r)⁶ with r = √15/5; y0 (1 + ε): t⁶ = −r⁶ ε exactly."""
-    model = from_coefficients([1, "x1", "x0 + 2", "2*x1", "2*x0 + y2", "y1", "y0"])
-    r = sqrt(15) / 5
-    free = {"x0": 15 * r**2 - 2, "x1": 6 * r, "y0": r**6, "y1": 6 * r**5, "y2": 15 * r**4 - 2 * (15 * r**2 - 2)}
-    found = diagnosis_of(model, **free)
-    assert (found.algebraic, found.re) == (6, pytest.approx(-r, rel=1e-14))
-    (law,) = response(found, "y0").laws
-    assert str(law.branches.exponent) == "1/6"
-    assert law.branches.constants[0] == pytest.approx(-(r**6), rel=1e-12)
-    assert (law.below, law.above) == (1.0, 1.0)
 
 
 def test_chains_two_and_one_of_a_threefold_root():
@@ -337,12 +322,6 @@ def test_a_root_that_is_a_rounded_zero_has_its_ranks():
     (diagnosis,) = tmsopt.diagnose(tmsopt.solve("problems/pt_trimer.toml"))
     assert diagnosis.jordan is not None
     assert (diagnosis.algebraic, diagnosis.geometric, diagnosis.partial) == (3, 1, (3,))
-
-
-def test_all_designs_take_no_diagnosis():
-    ended = CliRunner().invoke(main, ["solve", "problems/coupled_pair.toml", "--all", "--full"])
-    assert ended.exit_code == 2
-    assert "--full" in ended.output
 
 
 def test_how_an_EP2_of_forty_modes_splits():

@@ -4,8 +4,6 @@ import csv
 import dataclasses
 import json
 import math
-from fractions import Fraction
-from math import comb
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +17,7 @@ from tmsopt.charts import chart
 from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.problem import Problem, load
-from tmsopt.roots import CLASSES, classify, find_motion
+from tmsopt.roots import CLASSES
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 SQRT2 = math.sqrt(2)
@@ -117,47 +115,6 @@ def test_standing_still_is_unstable():
         a = exact_polynomial({**BASE, "chi_B": 1.3, "Fr": 0.0, "lambda_s": float(found.grid[1][i])})
         assert CLASSES[found.kind[i, 0]] == curves.kind(a)
         assert found.kind[i, 0] < CLASSES.index("stable")
-
-
-@pytest.mark.parametrize("distance", [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
-def test_beside_ep4_roots_are_jointly_right_and_classes_exact(distance):
-    """(s − ω0)⁴ with coefficients moved: the roots of the very doubles, isolated exactly.
-
-    A backward error of a few units of rounding moves a 4-fold root by its fourth root, and a root that is δ^(1/4)
-    from the others by that unit over δ^(3/4).
-    """
-    rng = np.random.default_rng(3)
-    c = np.array([comb(4, k) * (-OMEGA0) ** k for k in range(5)]) * np.ones((12, 1))
-    c[:, 1:] *= 1 + distance * rng.uniform(-1, 1, (12, 4))
-    found = classify(list(c.T))
-    unit = 20 * np.finfo(float).eps
-    tolerance = abs(OMEGA0) * min(unit**0.25, 4 * unit / max(distance, 1e-300) ** 0.75)
-    for row, code, count, value in zip(c, found.kind, found.real_roots, find_motion(list(c.T)).abscissa, strict=True):
-        exact = [Fraction(x) for x in row.tolist()]
-        assert CLASSES[code] == curves.kind(exact)
-        assert count == sum(sturm(exact))
-        assert value == pytest.approx(max(float(z.real) for z, _ in certified_roots(exact)), abs=tolerance)
-
-
-def test_classify_by_hand():
-    rows = {
-        (1, 10, 35, 50, 24): ("heavily damped", 4, -1.0),  # −1 −2 −3 −4
-        (-1, -10, -35, -50, -24): ("heavily damped", 4, -1.0),
-        (1, 4, 8, 8, 3): ("stable", 2, -1.0),  # (s + 1)² is not 2 roots more: (s+1)²(s²+2s+3)
-        (1, 0, 5, 0, 4): ("weave", 0, 0.0),  # ±i ±2i: not asymptotically stable
-        (1, 6, 11, 6, 0): ("capsize", 4, 0.0),  # 0 −1 −2 −3
-        (1, -1, 1, -1, 0): ("capsize", 2, 1.0),  # 0, 1, ±i
-        (1, 0, 0, 0, -1): ("capsize", 2, 1.0),
-        (0, 1, 2, 3, 4): ("undefined", 0, math.nan),
-        (1, -2, 3, -2, 2): ("weave", 0, 1.0),  # ±i, 1 ± i
-    }
-    a = np.array(list(rows), dtype=float).T
-    found = classify(list(a))
-    assert [CLASSES[k] for k in found.kind] == [v[0] for v in rows.values()]
-    expected_real = [1 if k == (1, 4, 8, 8, 3) else v[1] for k, v in rows.items()]
-    assert found.real_roots.tolist() == expected_real  # different ones
-    assert find_motion(list(a)).abscissa == pytest.approx([v[2] for v in rows.values()], abs=1e-7, nan_ok=True)
-    assert classify([[1.0, np.inf], [np.nan, 1.0], 1.0, 1.0, 1.0]).kind.tolist() == [0, 0]
 
 
 def test_constraints_are_held_where_they_hold():
@@ -289,36 +246,6 @@ def test_chart_json_is_finite(run):
     assert data["axes"]["Fr"] == {"min": 0.01, "max": 5.0, "points": 30, "unit": "1"}
     assert sum(data["classes"].values()) == pytest.approx(1)
     assert data["boundaries"] is None
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ("trace problems/ep_set.toml --pattern EP9", "unknown pattern 'EP9'"),
-        ("trace problems/ep_set.toml --pattern EP2", "2 free parameters"),
-        ("trace problems/chart.toml", "no pattern to trace"),
-        (
-            "trace problems/ep_set.toml --plot x.png --axes Fr,mu",
-            "accepted: two of the free parameters",
-        ),
-        ("trace problems/ep_set.toml --csv no/such/x.csv", "does not exist"),
-        ("trace problems/ep_set.toml --csv x.txt", "ending in csv"),
-        ("trace problems/ep_set.toml --step 0.5", "--step"),
-        ("trace nothing.toml", "nothing.toml"),
-        ("chart problems/chart.toml --axes Fr,Fr", "accepted: Fr and lambda_s"),
-        (
-            "chart problems/chart.toml --points 1",
-            "--points: found (1, 1); accepted: two whole numbers, each from 2",
-        ),
-        ("chart problems/chart.toml --points 40by30", "of at least 2"),
-        ("chart problems/chart.toml --output problems/x.csv", "ending in npz"),
-        (f"chart problems/chart.toml --points 5 -o {'x' * 300}.npz", "--output"),
-    ],
-)
-def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, run):
-    status, out, err = run(*arguments.split())
-    assert (status, out) == (2, "")
-    assert words in " ".join(err.split())
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full")

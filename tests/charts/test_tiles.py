@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from helpers.charts import EXTRA, FIXED, PLANE, POINTS, SPACE, charted, files
 
-from tmsopt.charts import LAYERS, Grid, add_tallies, chart, count_tile, open_chart, plan_survey
+from tmsopt.charts import LAYERS, chart, open_chart, plan_survey
 from tmsopt.errors import InputError
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity
 from tmsopt.problem import Problem, array_function
-from tmsopt.roots import CLASSES
 
 
 @pytest.fixture(scope="module")
@@ -73,17 +72,6 @@ def test_three_axes_are_planes_one_above_the_other(tmp_path):
     assert [best[n] for n in axes] == [v[k] for v, k in zip(found.grid, place[::-1], strict=True)]
 
 
-def test_a_grid_knows_its_designs():
-    grid = Grid(("x", "y", "z"), (np.arange(4.0), np.arange(10, 13.0), np.arange(20, 22.0)))
-    arrays = dict(zip("zyx", np.meshgrid(*grid.values[::-1], indexing="ij"), strict=True))
-    assert grid.shape == arrays["x"].shape == (2, 3, 4)
-    rows = grid.columns(range(1, 5))
-    for name, array in arrays.items():
-        assert np.array_equal(np.broadcast_to(rows[name], (4, 4)), array.reshape(6, 4)[1:5])
-    assert grid.design(17) == {name: array.flat[17] for name, array in arrays.items()}
-    assert [r for tile in grid.tiles(9) for r in tile] == list(range(6))
-
-
 def test_single_precision_is_the_double_rounded(whole, tmp_path):
     found = charted(tmp_path / "single.chart", single=True)
     for name in ("abscissa", "damping_ratio", "margin", "excess"):
@@ -101,21 +89,6 @@ def test_only_what_is_asked_for_is_kept(tmp_path):
     other = charted(tmp_path / "other.chart", layers=(), quantities={"x": "Fr"})
     assert list(other.layers) == ["x"]
     assert other.shares == {}
-
-
-def test_counts_are_those_of_the_arrays():
-    rng = np.random.default_rng(0)
-    kind, satisfied = rng.integers(0, 5, (6, 10)).astype(np.int8), rng.random((6, 10)) < 0.5
-    abscissa = rng.normal(size=(6, 10)).round(1)
-    abscissa[2] = np.nan
-    layers = {"kind": kind, "satisfied": satisfied, "abscissa": abscissa}
-    parts = [count_tile({n: a[k : k + 2] for n, a in layers.items()}, 10 * k, 1) for k in (4, 0, 2)]
-    found = add_tallies(parts)
-    allowed = np.where(satisfied, abscissa, np.nan)
-    assert (found.least, found.place) == (np.nanmin(allowed), np.nanargmin(allowed))
-    assert found.shares == {n: np.mean(kind == k) for k, n in enumerate(CLASSES)}
-    assert (found.satisfied, found.designs, found.fallbacks) == (satisfied.sum(), 60, 3)
-    assert count_tile({"abscissa": np.full((2, 2), np.nan)}, 0).place == -1
 
 
 OSCILLATOR = Model(

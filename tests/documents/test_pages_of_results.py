@@ -488,15 +488,6 @@ def test_an_ending_is_refused_before_any_work(command, run):
 
 
 @pytest.mark.slow
-def test_an_infeasible_problem_has_a_page(tmp_path, run):
-    """And the status of its command."""
-    file = tmp_path / "slow.toml"
-    file.write_text(text_of("ep4") + '[constraints]\ndecay = "abscissa <= -1"\nslow = "Fr <= 1"\n', encoding="utf-8")
-    assert run("solve", file, "--report", tmp_path / "p.html")[0] == 3
-    assert Page((tmp_path / "p.html").read_text(encoding="utf-8")).badges[0] == "infeasible"
-
-
-@pytest.mark.slow
 def test_a_design_so_far_has_a_page(tmp_path):
     for status, said in (
         ("not_converged", "stopped before the end, the best design so far"),

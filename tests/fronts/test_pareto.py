@@ -420,10 +420,6 @@ def test_designs_that_are_not_stable_are_marked(tmp_path, objectives):
     marked = {"not stable": [line for line in lines if line.get_label() == "not stable"]}
     if len(objectives) == 2:
         marked["hollow"] = [line for line in lines if line.get_markerfacecolor() == "white"]
-        parts = [(pair, all(whole)) for pair, whole in zip(pairwise(values), pairwise(stable), strict=True)]
-        for colour, style, kept in (("#000000", "-", True), ("#D55E00", "--", False)):
-            drawn = [line for line in lines if (line.get_color(), line.get_linestyle()) == (colour, style)]
-            assert [[*map(tuple, line.get_xydata())] for line in drawn] == [[*pair] for pair, s in parts if s is kept]
     for found in marked.values():
         assert {tuple(xy) for line in found for xy in line.get_xydata()} == set(unstable)
 
@@ -450,14 +446,8 @@ def test_the_command_writes_table_csv_and_plot(file, tmp_path):
     x = np.array([float(r["chi_B"]) for r in rows])
     assert np.array([float(r["sin(2*chi_B) - 0.3*chi_B"]) for r in rows]) == pytest.approx(np.sin(2 * x) - 0.3 * x)
     assert (tmp_path / "front.png").read_bytes()[:4] == b"\x89PNG"
-
-
-@pytest.mark.slow
-def test_the_command_writes_json(file):
     done = command("solve", file, "--points", 2, "--json")
-    assert done.exit_code == 0, done.output
-    data = json.loads(done.stdout)
-    assert [g["index"] for g in data["gaps"]] == [0]
+    assert (done.exit_code, [g["index"] for g in json.loads(done.stdout)["gaps"]]) == (0, [0])
 
 
 OBJECTIVE = 'pareto = ["chi_B", "sin(2*chi_B) - 0.3*chi_B"]'

@@ -267,7 +267,7 @@ def test_the_chance_of_another_solution_is_claimed_with_95_percent_confidence(sh
         assert kept >= 0.95 * 2000
 
 
-@pytest.mark.parametrize("rate", [1e-9, 1e6, 1e12])
+@pytest.mark.parametrize("rate", [1e-9, 1e12])
 def test_all_EP2_of_a_dimer_in_any_unit(rate):
     """k = |g1 − g2|/2 and d = 0 alone: the discriminant (d − i (g1 − g2))² + 4 k² is 0 nowhere else with k > 0."""
     dimer = from_hamiltonian([["d - 1j*g1", "k"], ["k", "-1j*g2"]])

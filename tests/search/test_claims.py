@@ -133,12 +133,14 @@ OPEN = [
 ]
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize(("coefficients", "asked", "best"), OPEN)
-@pytest.mark.slow
-def test_there_is_no_best_design_where_a_root_goes_to_infinity(coefficients, asked, best, sign):
+@pytest.mark.parametrize(
+    ("number", "sign"), [(0, 1), *(pytest.param(k, (-1) ** k, marks=pytest.mark.slow) for k in range(1, len(OPEN)))]
+)
+def test_there_is_no_best_design_where_a_root_goes_to_infinity(number, sign):
+    coefficients, asked, best = OPEN[number]
     design = tmsopt.solve(problem([sign * c for c in coefficients], **asked), throw=False)
     assert design.status == "not_converged"
+    assert "no best design exists" in str(design)
     assert any(
         note.startswith("no best design: the objective improves towards a singular mass matrix")
         for note in design.notes

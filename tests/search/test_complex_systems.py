@@ -141,21 +141,11 @@ def test_heavy_damping_of_the_polynomial_is_no_boundary():
     assert not tmsopt.nearest(tmsopt.solve("problems/ring_backscattering.toml"), "heavy damping").found
 
 
-def test_a_carrier_of_a_million_couplings():
-    """No false exceptional point is found: it is where it is without the carrier, to the roundings of that."""
-    model = from_hamiltonian([["w1 - 1j*g1", "k"], ["k", "w - 1j*g2"]])
-    free = {"w1": (1e6 - 1, 1e6 + 1), "k": (0.01, 1)}
-    found = tmsopt.solve(tmsopt.Problem(model, fixed={"w": 1e6, "g1": 0.3, "g2": 0.1}, free=free, locate="EP2"))
-    assert found.parameters["k"] == pytest.approx(0.1, abs=EXACT)
-    assert found.parameters["w1"] == pytest.approx(1e6, abs=1.2e-10)
-    assert tmsopt.prove(found).proved
-
-
 def test_the_optimum_of_a_lossy_dimer_is_its_trace():
     """No eigenfrequency decays faster than the mean loss, which all reach beyond the exceptional point."""
     found = tmsopt.solve(dimer({"k": (0.1, 2)}, minimize="abscissa"))
     assert found.abscissa == pytest.approx(-0.6, abs=EXACT)
-    assert found.bound.proven
+    assert (found.status, found.bound.proven) == ("optimal", True)
 
 
 @pytest.mark.parametrize("size", [1, 2, 3])
@@ -267,6 +257,7 @@ def test_a_parameter_at_zero_is_changed_absolutely_and_shifts_hold():
     assert "nowhere sampled" not in text
 
 
+@pytest.mark.slow
 def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met():
     """The EP3 of the trimer at g = l = √2, d = 0: what is printed near it is right to half a unit of its last digit."""
     model = from_hamiltonian([["d + 1j*g", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j*l"]])
@@ -374,13 +365,3 @@ def test_coefficients_cannot_tell():
     found = tmsopt.solve(tmsopt.Problem(swing, free={"c": (0.0, 3.0)}, locate="EP2"))
     assert found.to_json()["defective"] is None
     assert "coefficients cannot tell" in str(found)
-
-
-def test_an_optimum_at_a_singular_mass_matrix_is_none():
-    """(m s + 1)(s + 2 − m): the abscissa m − 2 is least at m = 0, where a root is at infinity."""
-    model = from_coefficients(["m", "1 + m*(2 - m)", "2 - m"])
-    found = tmsopt.solve(tmsopt.Problem(model, free={"m": (0.0, 0.4)}, minimize="abscissa"), throw=False)
-    assert found.status == "not_converged"
-    assert "no best design exists" in str(found)
-    held = tmsopt.solve(tmsopt.Problem(model, free={"m": (0.01, 0.4)}, minimize="abscissa"))
-    assert held.abscissa == pytest.approx(-1.99, abs=1e-8)

@@ -15,7 +15,7 @@ import tmsopt
 from benchmarks.suites import hard_problem
 from tmsopt.errors import InputError
 from tmsopt.models import from_coefficients
-from tmsopt.problem import expected_unseen, expects_few_better
+from tmsopt.problem import expected_unseen
 from tmsopt.search import SearchState, make_failed_end
 
 accepting, driver, sampling, states = (
@@ -173,11 +173,6 @@ def test_the_words_follow_from_the_numbers(tried, at_best, counts, words):
     assert tmsopt.Starts(tried, tried, at_best, **counts).sureness == words
 
 
-def test_few_starts_tell_nothing_of_better_ones():
-    assert not expects_few_better(4, 1)
-    assert tmsopt.Starts(3, 3, 3, optima=1).expected_unseen == float("inf")
-
-
 # The loop
 
 
@@ -226,14 +221,6 @@ def test_what_another_stage_accepts_is_rechecked_inside_the_box(praised, rescued
     assert design.parameters["x"] <= 2.0
     assert design.value == pytest.approx(depth(design.parameters["x"]), abs=1e-12)
     assert bool(design.violations) == (design.parameters["x"] > 0)
-
-
-def test_a_search_that_ends_early_is_not_sure():
-    hasty = solve(wells(), policy=replace(POLICY, enough=lambda state: True)).starts
-    assert (hasty.runs, hasty.sureness[-1]) == (1, "a better design is possible")
-    whole = solve(wells()).starts
-    assert whole.runs >= whole.optima + 2
-    assert len(whole.sureness) == 1
 
 
 @pytest.mark.parametrize(

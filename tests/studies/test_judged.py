@@ -175,11 +175,8 @@ def drawn(tmp_path_factory):
     [
         ({"rows": 30}, "columns.Fr: 20 values in the store, 30 in the file"),
         ({"seed": 2}, "seed: 1 in the store, 2 in the file"),
-        ({"distribution": "uniform"}, "columns.Fr: 20 of 20 values differ"),
         ({"tolerances": SPREAD | {"Fr": 0.03}}, "columns.Fr: 20 of 20 values differ"),
-        ({"report": ["nu_H"]}, "report: [] in the store"),
         ({"problem": replace(DRAWN.problem, fixed={**DRAWN.problem.fixed, "mu": 0.2})}, "problem.fixed.mu: 0.1"),
-        ({"problem": replace(DRAWN.problem, constraints={"slow": "Fr <= 3"})}, "problem.constraints.slow: none"),
     ],
     ids=lambda given: next(iter(given)) if isinstance(given, dict) else "is",
 )

@@ -96,7 +96,12 @@ def test_every_row_obeys_the_laws_of_ep4():
         assert row.laws.keys() >= {"w01", "chib1", "tls", "frep4", "epset"}
         assert max(abs(residual) for residual in row.laws.values()) < 1e-9  # coefficients are matched to 1e-10
     assert [row.number for row in found.rows] == list(range(6))
-    assert found.solved == 6
+    assert (found.solved, dict(found.summary.counts)) == (6, {"optimal": 6})
+    np.testing.assert_array_equal(found.column("varied.zeta_H"), [-0.2, -0.3, -0.35] * 2)
+    np.testing.assert_array_equal(found.column("chi_B"), [row.parameters["chi_B"] for row in found.rows])
+    np.testing.assert_array_equal(found.column("report.2*Fr"), 2 * found.column("Fr"))
+    assert "Row(" not in repr(found)
+    assert "did you mean 'chi_B'" in faults(found.column, "chi_b")
 
 
 @pytest.mark.long
@@ -105,33 +110,6 @@ def test_rows_are_the_same_in_any_order_alone_and_by_processes(tmp_path):
     assert_same([backwards((k,))[0] for k in reversed(range(6))], here)
     assert_same([solve_row(GRID, k).row for k in range(6)], here)
     assert_same(run_study(GRID, tmp_path / "s.sqlite", workers=2).rows, here)
-
-
-@pytest.mark.slow
-def test_a_study_is_taken_up_where_it_was_left(tmp_path, monkeypatch):
-    """Interrupted after three rows; the rest is solved later, and nothing twice."""
-    path = tmp_path / "s.sqlite"
-    tried = []
-    original = Solver.solve_rows
-
-    def counting(self, numbers):
-        tried.extend(numbers)
-        return original(self, numbers)
-
-    def interrupt(told):
-        if told.done == 3:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr("tmsopt.progress.PAUSE", 0.0)
-    monkeypatch.setattr(Solver, "solve_rows", counting)
-    with pytest.raises(KeyboardInterrupt):
-        run_study(GRID, path, workers=1, progress=interrupt)
-    assert stored(path) == {0, 1, 2}
-    resumed = run_study(GRID, path, workers=1)
-    assert resumed.solved == 3
-    assert sorted(tried) == list(range(6))
-    monkeypatch.undo()
-    assert_same(resumed.rows, run_study(GRID, workers=1).rows)
 
 
 def test_failures_are_rows_with_a_cause():
@@ -174,17 +152,6 @@ def test_a_summary_of_rows_is_what_its_numbers_are_by_definition():
     assert dict(told.causes) == {"a": 2, "b by 3": 1}
     greatest = over_grid(replace(EP4, minimize=None, maximize="Fr"), {"mu": [0.1] * 7})
     assert summarise(RowTable(greatest, [batch_rows(made)])).best.number == 3
-
-
-@pytest.mark.slow
-def test_results_are_columns():
-    found = run_study(GRID, workers=1)
-    np.testing.assert_array_equal(found.column("varied.zeta_H"), [-0.2, -0.3, -0.35] * 2)
-    np.testing.assert_array_equal(found.column("chi_B"), [row.parameters["chi_B"] for row in found.rows])
-    np.testing.assert_array_equal(found.column("report.2*Fr"), 2 * found.column("Fr"))
-    assert found.summary.counts == {"optimal": 6}
-    assert "Row(" not in repr(found)
-    assert "did you mean 'chi_B'" in faults(found.column, "chi_b")
 
 
 def test_calls_that_make_no_sense_are_refused():
