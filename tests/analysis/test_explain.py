@@ -74,32 +74,6 @@ def test_least_speed_of_an_ep4_beside_its_closed_form():
     assert not [w for w in explanation.warnings if "decay" in w]  # a named constraint is meant
 
 
-@pytest.mark.slow
-def test_most_tilt_at_a_given_decay_beside_the_ep_set():
-    """chi_H = 1, chi_B = r, p = a0 (s² + 2x s + 1/h)²: matching a1 and a2 leaves one equation, linear in tan lambda_s."""
-
-    def tilt(x):
-        h, r = mp.sqrt(mp.mpf(ZETA_B) * ZETA_H), mp.sqrt(mp.mpf(ZETA_B) / ZETA_H)
-        k = -4 * x * ZETA_H * ZETA_B / (ZETA_B - ZETA_H * r)  # Fr = k T
-        return mp.atan((ZETA_B + ZETA_H - (4 * x * x + 2 / h) * ZETA_H * ZETA_B) / (k * k * (ZETA_B - ZETA_H)))
-
-    solution, explanation, levers = explained(
-        fixed=CHI_H_1, free=BOX, maximize="lambda_s", constraints={"fast": "abscissa <= -1"}
-    )
-    lever = levers["fast"]
-    assert solution.structure == "CEP2"
-    assert solution.value == pytest.approx(float(tilt(1)), rel=1e-11)
-    assert lever.per_unit == pytest.approx(-float(mp.diff(tilt, 1)), rel=1e-8)
-    assert lever.step == 0.01
-    assert lever.resolved == pytest.approx(float(tilt(0.99) - tilt(1)), rel=1e-8)
-    assert (
-        lever.sentence
-        == "relaxing fast (abscissa <= -1) by 0.01 improves the objective by 0.453 deg (first-order estimate 0.45 deg)"
-    )
-    assert explanation.warnings == ()
-    assert "lambda_s found is 44.877 deg" in explanation.summary
-
-
 # Levers beside independent optima
 
 

@@ -108,15 +108,6 @@ def test_a_singular_mass_matrix_is_undefined():
     json.dumps(everywhere.to_json(), allow_nan=False)
 
 
-def test_standing_still_is_unstable():
-    """Fr = 0: a1 = a3 = 0, roots in pairs ±s, never asymptotically stable."""
-    found = charted(BASE | {"chi_B": 1.3}, {"Fr": (0.0, 1.0), "lambda_s": (0.1, 1.0)}, points=(3, 20))
-    for i in range(20):
-        a = exact_polynomial({**BASE, "chi_B": 1.3, "Fr": 0.0, "lambda_s": float(found.grid[1][i])})
-        assert CLASSES[found.kind[i, 0]] == curves.kind(a)
-        assert found.kind[i, 0] < CLASSES.index("stable")
-
-
 def test_constraints_are_held_where_they_hold():
     constraints = {"fast": "Fr >= 1.2 * Fr_c", "tilt": "tan(lambda_s) + Fr <= 3", "rate": "abscissa <= -0.3"}
     fixed, free = PLANES["on the law"]
@@ -137,19 +128,6 @@ def test_least_abscissa_is_the_least():
     roots = [float(z.real) for z, _ in certified_roots(exact_polynomial(design))]
     assert best["value"] == pytest.approx(max(roots), abs=1e-9)
     assert best["value"] == found.abscissa.min() >= OMEGA0  # `w0` bounds them all
-
-
-def test_the_archive_reads_back_with_named_axes(tmp_path):
-    path = tmp_path / "chart.npz"
-    charted(*PLANES["both tilts"], axes=("lambda_s", "chi_B"), points=(9, 6)).save(path)
-    with np.load(path, allow_pickle=False) as data:
-        assert np.array_equal(data["lambda_s"], np.linspace(-1.4, 1.4, 9))
-        assert np.array_equal(data["chi_B"], np.linspace(-1, 3, 6))
-        assert data["kind"].shape == (6, 9)
-        about = json.loads(str(data["about"]))
-    assert about["dimensions"] == ["chi_B", "lambda_s"]
-    assert about["classes"] == list(CLASSES)
-    assert about["fixed"]["Fr"] == FR_EP4 + 0.5
 
 
 @pytest.mark.parametrize(
@@ -185,20 +163,6 @@ def test_trace_writes_table_csv_and_figure(tmp_path, run):
     (ep4,) = [row for row in rows if row["kind"] == "EP4"]
     assert float(ep4["Fr"]) == pytest.approx(FR_EP4, abs=1e-12)
     assert "EP4" in ep4["event"]
-
-
-def test_trace_json_is_finite_and_of_another_pattern_where_asked(run):
-    status, out, err = run("trace", "problems/off_law.toml", "--pattern", "weave", "--starts", 8, "--json")
-    assert (status, err) == (0, "")
-    data = json.loads(out, parse_constant=pytest.fail)
-    assert data["schema"] == 1
-    assert data["pattern"] == "weave"
-    assert data["free"] == ["Fr", "lambda_s"]
-    (branch,) = data["branches"]
-    assert branch["points"] == len(branch["columns"]["Fr"]) == data["points"]
-    x = SQRT2 - 0.1
-    for Fr, angle in zip(branch["columns"]["Fr"], branch["columns"]["lambda_s"], strict=True):
-        assert Fr**2 == pytest.approx(0.2 / (0.4 - 0.2 * x) * x / (x - 1) * math.tan(angle), rel=1e-12)  # `Frc1`
 
 
 NOTHING = """

@@ -10,7 +10,7 @@ from helpers.charts import EXTRA, FIXED, PLANE, POINTS, SPACE, charted, files
 from tmsopt.charts import LAYERS, chart, open_chart, plan_survey
 from tmsopt.errors import InputError
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity
-from tmsopt.problem import Problem, array_function
+from tmsopt.problem import Problem
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_quantities_are_those_of_every_design(whole):
 
 def test_three_axes_are_planes_one_above_the_other(tmp_path):
     axes, points = ("chi_B", "lambda_s", "Fr"), (9, 7, 5)
-    found = chart(SPACE, axes, folder=tmp_path / "space.chart", points=points, tile=31, quantities={"x": "Fr_c"})
+    found = chart(SPACE, axes, folder=tmp_path / "space.chart", points=points, tile=31)
     assert found.layers["kind"].shape == (5, 7, 9)
     assert found.about["dimensions"] == ["Fr", "lambda_s", "chi_B"]
     for k, Fr in enumerate(found.grid[2]):
@@ -62,10 +62,6 @@ def test_three_axes_are_planes_one_above_the_other(tmp_path):
         flat = chart(plane, axes[:2], points=points[:2], boundaries=False)
         for name in ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied"):
             assert found.layers[name][k].tobytes() == getattr(flat, name).tobytes()
-        function = array_function(plane.posed, {"x": "Fr_c"})
-        x, y = np.meshgrid(*flat.grid)
-        critical = function(plane.posed.ordered({"chi_B": x, "lambda_s": y}))["x"]
-        assert np.array_equal(found.layers["x"][k], critical, equal_nan=True)
     best = found.to_json()["least_abscissa"]
     assert best["value"] == found.layers["abscissa"].min()
     place = np.unravel_index(np.argmin(found.layers["abscissa"]), (5, 7, 9))

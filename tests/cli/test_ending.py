@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from importlib import import_module
-from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -252,24 +251,6 @@ def test_a_proof_that_is_stopped_leaves_the_design(run, monkeypatch, where, tmp_
     data = json.loads(out)
     assert (status, data["interrupted"], data["status"]) == (130, True, "optimal")
     assert "the proof was interrupted" in data["notes"]
-
-
-@pytest.mark.slow
-def test_a_front_that_is_stopped_leaves_what_is_known(run, monkeypatch):
-    """Its two ends, and the points between them that were found before; none of them dominates another."""
-    curve = import_module("tmsopt.fronts.curve")
-    probe = curve._Search.probe
-
-    def third(search, *words, **more):
-        return probe(search, *words, **more) if len(search.probes) < 2 else (press(), time.sleep(LONG))
-
-    monkeypatch.setattr(curve._Search, "probe", third)  # of rounds: one sub-problem, then two
-    status, out, _ = run("solve", "problems/pareto.toml", "--starts", "1", "--json")
-    data = json.loads(out)
-    values = [p["objectives"] for p in data["points"]]
-    assert (status, data["interrupted"], data["solved"]) == (130, True, 5)
-    assert 2 <= len(values) <= 5
-    assert all(a[0] < b[0] and a[1] > b[1] for a, b in pairwise(values))
 
 
 @pytest.mark.slow

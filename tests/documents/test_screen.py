@@ -213,6 +213,7 @@ def test_how_near_a_design_comes_is_said_of_its_worst_case():
     assert 0.167 < float(near) <= float(least)
 
 
+@pytest.mark.slow
 def test_a_load_of_zero_is_zero_in_newtons_too():
     """The active limit load_rear >= 0 leaves a rounding error of 1e-17."""
     design = tmsopt.solve("problems/realistic.toml")

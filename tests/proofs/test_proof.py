@@ -165,30 +165,6 @@ def test_the_printed_region_and_error_are_proved():
     assert 0.9 * proof.uniqueness < region <= proof.uniqueness
 
 
-def test_uniqueness_ends_before_the_other_solution():
-    """At Fr = 2.25 the EP set is met at two tilts, the roots of a quadratic; each is proved, unique up to the other."""
-    problem = bicycle("2EP2", {"Fr": 2.25}, {"chi_B": (1.01, 3), "lambda_s": (0.02, 1.4)})
-    r, h = SQRT2, SQRT2 / 5
-    square = 2.25**2 * (r - 1)
-    tilts = np.roots([4 * (r + 1) ** 2 * h, -square * 4 * h * (r + 1), square * r * (r - 1)])
-    proofs = []
-    for T, kind in zip(sorted(tilts), ("2EP2", "CEP2"), strict=True):
-        design = {**problem.fixed, "chi_B": r, "lambda_s": math.atan(T)}
-        proof = prove_design(replace(problem, locate=kind).posed, polished(design), kind)
-        assert proof.proved, proof.reason
-        assert float(proof.tangents["lambda_s"]) == pytest.approx(T, abs=1e-12)
-        proofs.append(proof)
-    apart = abs(tilts[0] - tilts[1])
-    assert all(0 < p.uniqueness < apart for p in proofs)
-
-
-def polished(design):
-    """The same with tan λ_s on the EP set to the last digit: numpy's roots near a fold lose a few."""
-    with workdps(30):
-        T = mp.findroot(lambda x: ep_set(x) - mpf(repr(design["Fr"])) ** 2, tan(design["lambda_s"]))
-        return {**design, "lambda_s": float(atan(T))}
-
-
 def test_the_critical_speed():
     """Table 1: Fr_c = √(30√2 + 120)/8 at the EP4's tilt and χ_B = √2; held here at doubles, so to 1e-14."""
     held = {"chi_B": SQRT2, "lambda_s": math.atan(15 / 4 - 75 * SQRT2 / 32)}

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -178,16 +177,8 @@ def test_json_has_eigenfrequencies_beside_roots():
     assert "eigenfrequencies" not in tmsopt.solve("problems/coupled_pair.toml").to_json()
 
 
-def test_studies_keep_to_the_matrix():
-    """A row for each g2; the exceptional point follows it."""
-    problem = tmsopt.load("problems/loss_only_dimer.toml")
-    rows = tmsopt.run_study(tmsopt.Study(problem, {"g2": [0.2, 0.4, 0.6]})).rows
-    assert [row.structure for row in rows] == ["EP2"] * 3
-    assert [row.parameters["k"] for row in rows] == pytest.approx([0.4, 0.3, 0.2], abs=EXACT)
-
-
-def test_charts_and_pages_take_a_complex_system():
-    """Stable beside unstable where the gain passes the loss; roots of the page are told as eigenfrequencies."""
+def test_charts_take_a_complex_system():
+    """Stable beside unstable where the gain passes the loss."""
     plane = laser({"g": (0.1, 1.5), "l": (0.1, 1.5)}, k=1.0)
     chart = tmsopt.chart(replace(plane, locate=None), ("g", "l"), points=(40, 40), boundaries=False)
     gain, loss = np.meshgrid(*chart.grid)
@@ -195,8 +186,6 @@ def test_charts_and_pages_take_a_complex_system():
     assert set(np.unique(names)) == {"stable", "weave"}
     off = np.minimum(np.abs(gain - loss), np.abs(gain * loss - 1)) > 1e-9
     assert np.array_equal((names == "stable")[off], ((gain < loss) & (gain * loss < 1))[off])
-    page = tmsopt.explore("problems/loss_only_dimer.toml").html
-    assert "both eigenfrequencies coincide (EP2)" in page
 
 
 def test_the_threshold_is_the_edge_and_says_which_eigenfrequency_is_real():
@@ -270,10 +259,6 @@ def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met():
             value = float(str(row[1]))
             if abs(value - math.sqrt(2)) < 1e-3 and "g" in row[-1].split(", "):
                 assert abs(value - math.sqrt(2)) <= 0.5 * 10.0 ** -len(str(row[1]).split(".")[1])
-    branch, event = next((b, e) for b in traced.branches for e in b.events if e in near)
-    met = replace(event, parameters={**event.parameters, "g": math.sqrt(2) + 3.8e-10}, residual=6e-11)
-    cells = list_events(replace(branch, events=(met,)), {"g": tmsopt.problem.Unit()}, model)[1]
-    assert str(cells[1]) == "1.4142136"  # two digits fewer than met
 
 
 @pytest.mark.slow
@@ -283,16 +268,6 @@ def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix():
     report = str(tmsopt.solve(asked))
     assert "worst case" in report
     assert "damping ratio" not in report
-
-
-def test_words_of_a_matrix_with_gain():
-    model = from_hamiltonian([["1j", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j"]])
-    told, chart = import_module("tmsopt.models.user_spectrum"), import_module("tmsopt.plots.chart")
-    lossy, gaining = (told.describe_user_structure(model, "EP2", gain) for gain in (False, True))
-    assert lossy == "the two least damped eigenfrequencies coincide (EP2)"
-    assert gaining == "the two eigenfrequencies of most gain coincide (EP2)"
-    (patch,) = chart.class_handles(np.array([chart.CLASSES.index("weave")], dtype=np.int8), model)
-    assert patch.get_label() == "gain, beyond threshold"
 
 
 # Crossings that keep their eigenvectors are no exceptional points
@@ -327,7 +302,7 @@ def test_the_search_goes_on_for_a_defective_one():
 
 
 def test_all_designs_count_crossings_apart():
-    every = tmsopt.solve_all(tmsopt.Problem(DIABOLIC, free=BOX, locate="EP2"), seconds=0)
+    every = tmsopt.solve_all(tmsopt.Problem(DIABOLIC, free=BOX, locate="EP2"), seconds=0, starts=8)
     assert not every.solutions
     assert every.coverage is not None
     assert every.coverage.crossings == every.coverage.starts

@@ -3,7 +3,7 @@
 What is minimised are two wells, the left one deeper (helpers/wells.py).
 """
 
-from dataclasses import FrozenInstanceError, fields, replace
+from dataclasses import fields, replace
 from importlib import import_module
 from types import SimpleNamespace
 
@@ -54,14 +54,6 @@ def test_starts_begin_with_those_at_hand_then_take_turns():
     assert [start.row for start in starts[2:4]] == [0, len(state.sample.refined)]
 
 
-@pytest.mark.parametrize(("at", "well"), [(-1.3, LEFT), (0.7, RIGHT), (1.9, RIGHT)])
-def test_a_start_ends_in_its_well(at, well):
-    (end,) = end_at(at)
-    assert end.feasible
-    assert begun().design_at(end)["x"] == pytest.approx(well, abs=1e-6)
-    assert end.objective == pytest.approx(depth(well), abs=1e-10)
-
-
 def test_the_best_end_is_accepted_whatever_their_order():
     ends = end_at(0.7, -1.3, 0.9)
     accepted = POLICY.accept(replace(begun(), ends=ends))
@@ -93,14 +85,6 @@ def test_an_end_off_the_rows_is_no_optimum(violation, slope, ended):
 
 
 # When a search ends: by the optima that are expected still, from how many starts ended in how many different ones
-
-
-def test_one_end_is_not_enough():
-    state = begun(sampled=True)
-    (end,) = end_at(-1.3, state=state)
-    assert not POLICY.enough(replace(state, ends=(end,)))
-    many = replace(state, ends=(replace(end, led=frozenset(range(len(state.sample.leaders)))),) * 8)
-    assert POLICY.enough(many)
 
 
 PLAIN = tmsopt.Problem(from_coefficients([1, 2 + x]), free={"x": (0.0, 1.0)}, minimize="x").posed
@@ -191,17 +175,6 @@ def test_a_stage_of_ones_own_is_called_with_the_state():
     design = solve(wells(), policy=replace(POLICY, enough=enough), throw=False)
     assert counts == [(1, None), (2, None)]  # accepted after the loop
     assert design.value == pytest.approx(depth(LEFT), abs=1e-8)  # the first start is the best of the sample
-
-
-def test_a_policy_cannot_make_a_design_look_better_than_it_is():
-    """Stages that lie are found out by the recheck."""
-
-    def flattered(state, start):
-        return replace(POLICY.local(state, start), objective=-1e3)
-
-    design = solve(wells(), policy=replace(POLICY, local=flattered), throw=False)
-    assert design.value >= depth(LEFT) - 1e-12
-    assert design.value == pytest.approx(depth(design.parameters["x"]), abs=1e-12)
 
 
 @pytest.mark.parametrize("rescued", [False, True])
@@ -312,8 +285,9 @@ def test_what_one_stage_draws_changes_no_other():
     refine, again, around = (sampling.stream(0, stage).random(4) for stage in ("refine", "refine", "around"))
     assert np.array_equal(refine, again)
     assert not np.array_equal(refine, around)
-    before, after = POLICY.sample(begun()), POLICY.sample(begun())
-    assert np.array_equal(before.refined.u, after.refined.u)
+    first, again, other = (POLICY.sample(replace(begun(), seed=seed)) for seed in (5, 5, 6))
+    assert np.array_equal(first.refined.u, again.refined.u)
+    assert not np.array_equal(first.refined.u, other.refined.u)
 
 
 @pytest.mark.slow
@@ -325,12 +299,6 @@ def test_one_bold_design_is_enough_to_approach_a_singular_mass_matrix():
 
 
 # Records and numbers
-
-
-def test_nothing_of_a_search_can_be_changed():
-    for record in (POLICY, tmsopt.TUNING, begun(), Start({})):
-        with pytest.raises(FrozenInstanceError):
-            setattr(record, fields(record)[0].name, None)
 
 
 def test_every_number_has_a_unit_a_reason_and_a_benchmark():

@@ -253,9 +253,6 @@ def test_least_ballast_of_an_isospectral_family():
     design = solved("isospectral")
     assert design.structure == "EP4"
     assert design.value == pytest.approx(best, abs=1e-8)
-    law = laws.ep4(-1.0, *(design.parameters[n] for n in ("zeta_B", "zeta_H", "chi_H")))[0]
-    for name, value in {**law._asdict(), "lambda_s": law.lambda_s}.items():
-        assert design.parameters.get(name, value) == pytest.approx(float(value), rel=1e-7)
     assert arm(dict(design.parameters)) >= 0.05 - 1e-9
     assert 1 < point["chi_H"] < 1.1  # the front mass just ahead of the front contact, as the file says
     assert design.parameters["lambda_s"] > pi / 180

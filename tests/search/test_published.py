@@ -306,19 +306,6 @@ def test_all_ep3_of_three_masses_are_found():
     assert ends == [pytest.approx([1.5, sign * height, 0.5, sign * height], abs=MET) for sign in (-1, 1)]
 
 
-def test_little_damping_need_not_weaken_the_pendulum():
-    """The best b1 for b2 = 0.01, by Hurwitz' determinant."""
-    b1, b2, p = sp.symbols("b1 b2 p")
-    a = polynomial("ziegler").all_coeffs()
-    load = sp.solve(sp.expand(a[1] * a[2] * a[3] - a[0] * a[3] ** 2 - a[4] * a[1] ** 2), p)[0]
-    free = replace(problem("ziegler"), fixed={"b2": 0.01}, free={"p": (0.0, 3.0), "b1": (0.0, 1.0)})
-    design = tmsopt.solve(free)
-    slope = sp.lambdify(b1, sp.diff(load.subs(b2, sp.Rational(1, 100)), b1), "mpmath")
-    best = mpmath.findroot(slope, (0.1, 0.12), solver="anderson")
-    assert design.parameters["b1"] == pytest.approx(float(best), abs=1e-6)  # a maximum is flat
-    assert design.value == pytest.approx(float(load.subs({b1: best, b2: 0.01})), abs=MET)
-
-
 @pytest.mark.parametrize("rate", [1e-3, 1e3])
 def test_twelve_roots_meet_whatever_the_unit_of_time(rate):
     """(s + rate)¹²: with the product of the roots held, their abscissa is least where all of them are equal."""

@@ -201,6 +201,7 @@ rear = "N_R >= 20"
 """
 
 
+@pytest.mark.slow
 def test_a_change_asks_no_more_than_what_the_nearest_design_misses(tmp_path):
     """Where two pairs meet at w = 1/(1 + mu) = 0.95, the abscissa is -sqrt(mu/(1 + mu))/2 = -0.1118, zeta 0.1147."""
     asked = written(tmp_path, DAMPED)
@@ -232,32 +233,6 @@ def test_no_limit_is_moved_for_nothing_nor_farther_than_a_known_design_needs(tmp
 
 
 # By moving the limits and solving again
-
-
-def moved(stated, amounts, share=1.0):
-    """The problem with its limits moved by a share of the amounts, in its text and its box."""
-    constraints, free = dict(stated.constraints), dict(stated.free)
-    for name, amount in amounts.items():
-        by = share * amount
-        if name in constraints:
-            text = constraints[name]
-            shift = f" - ({by!r})" if ">=" in text else f" + ({by!r})"
-            constraints[name] = text + shift
-        else:
-            parameter, end = name.split(".")
-            lower, upper = free[parameter]
-            free[parameter] = (lower - by, upper) if end == "min" else (lower, upper + by)
-    return replace(stated, constraints=constraints, free=free)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("key", PROBLEMS)
-def test_moving_by_the_amounts_frees_the_problem_and_by_less_does_not(key):
-    stated, relaxation = PROBLEMS[key], failed(key).relaxation
-    found = tmsopt.solve(moved(stated, relaxation.amounts), throw=False)
-    assert found.status == "optimal"
-    if key in ("slow and stable", "two bounds", "ep4 above the law"):
-        assert tmsopt.solve(moved(stated, relaxation.amounts, 0.99), throw=False).status == "infeasible"
 
 
 @pytest.mark.slow

@@ -74,7 +74,7 @@ def test_a_start_on_the_losing_side_does_not_decide():
     assert design.parameters["lambda_s"] > 0
 
 
-@pytest.mark.parametrize("tilt", [(0.0, 1.2), (0.05, 1.2), (-1.2, 0.0), (-1.2, -0.05)])
+@pytest.mark.parametrize("tilt", [(0.05, 1.2), (-1.2, 0.0)])
 def test_one_sign_has_no_sides(tilt):
     stated = problem(free={**BOX, "lambda_s": tilt}, minimize="Fr - lambda_s**2")
     assert [state.side for state in begin_search(stated.posed)] == [""]
@@ -116,12 +116,3 @@ def test_the_side_with_the_best_design_of_a_sample_is_searched_first():
     assert searched == [BACKWARD, FORWARD]
     assert list(design.sides) == [FORWARD, BACKWARD]
     assert design.value == pytest.approx(-(12.5**0.25), abs=1e-11)
-
-
-def test_a_part_is_solved_in_its_own_box():
-    """Its program has the ends of the tilt, as tangents, on one side of 0."""
-    asked = problem(minimize="abscissa").posed
-    for state, ends in zip(begin_search(asked), ((0.0, 1.2), (-1.2, 0.0)), strict=True):
-        program = state.nlp
-        k = list(asked.free).index("lambda_s")
-        assert (program.lower[k], program.upper[k]) == pytest.approx(np.tan(ends), abs=1e-15)
