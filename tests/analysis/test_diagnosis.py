@@ -119,18 +119,6 @@ def test_a_slope_that_is_rounding_moves_nothing():
     assert response(found, "x") == Response("x", False, (), 2)
 
 
-def test_six_uncoupled_oscillators_with_critical_damping():
-    """(s² + c s + 1)⁶ at c = 2: six chains of two, each moved by t² = 2 ε for c (1 + ε)."""
-    eye = np.eye(6, dtype=int)
-    damping, stiffness = (np.where(eye, name, "0").tolist() for name in "ck")
-    model = from_matrices(eye.tolist(), damping, stiffness)
-    found = diagnosis_of(model, c=2.0, k=1.0)
-    assert (found.kind, found.algebraic, found.partial) == ("partly defective", 12, (2,) * 6)
-    law = response(found, "c").laws[0].branches
-    assert (law.roots, str(law.exponent)) == (12, "1/2")
-    assert law.constants == pytest.approx([2] * 6, rel=1e-10)
-
-
 def test_chains_two_and_one_of_a_threefold_root():
     found = diagnosis_of(from_matrices(A=[[-1, 1, 0], ["d", -1, 0], [0, 0, "f - 1"]]), d=0.0, f=0.0)
     assert (found.kind, found.algebraic, found.geometric, found.partial) == ("partly defective", 3, 2, (2, 1))

@@ -186,23 +186,6 @@ def test_nothing_found_ends_with_3_and_says_so(tmp_path, run):
     assert json.loads(out)["branches"] == []
 
 
-@pytest.mark.slow
-def test_chart_writes_table_archive_and_figure(tmp_path):
-    archive, figure = tmp_path / "chart.npz", tmp_path / "chart.png"
-    done = tmsopt(
-        "chart", "problems/chart.toml", "--points", "40x30", "-o", archive, "--plot", figure, "--axes", "lambda_s,Fr"
-    )
-    assert done.returncode == 0
-    assert done.stderr.splitlines() == [f"wrote {archive}", f"wrote {figure}"]
-    assert "heavily damped" in done.stdout
-    assert "EP4" in done.stdout
-    assert "0.410677532" in done.stdout  # arctan(15/4 − 75√2/32)
-    assert figure.read_bytes().startswith(b"\x89PNG")
-    with np.load(archive) as data:
-        assert data["kind"].shape == (30, 40)
-        assert (data["lambda_s"][0], data["lambda_s"][-1]) == (0.01, 1.4)
-
-
 def test_chart_json_is_finite(run):
     status, out, err = run("chart", "problems/chart.toml", "--points", "30", "--no-boundaries", "--json")
     assert (status, err) == (0, "")

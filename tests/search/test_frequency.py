@@ -198,14 +198,6 @@ def test_a_frequency_of_0_is_the_least_there_is():
     assert (design.value, design.bound.value) == (0, 0)
 
 
-def test_a_chart_has_it():
-    plane = asked({n: BOX[n] for n in ("v", "x_B")}, {"lambda_s": 0.2}, constraints=SLOW)
-    chart = tmsopt.chart(plane, points=[7, 5], quantities={"f": "frequency"})
-    v, x_B = np.meshgrid(np.linspace(*BOX["v"], 7), np.linspace(*BOX["x_B"], 5))
-    own = frequency({"v": v, "x_B": x_B, "lambda_s": 0.2})
-    assert chart.quantities["f"] == pytest.approx(own, abs=TOLERANCE)
-
-
 def test_an_equality_is_met_and_neither_proved_nor_counted():
     free = {"v": (2.0, 8.0), "x_B": (1.05, 2.0)}
     equal = asked(free, {"lambda_s": 0.3}, locate="EP2", constraints={"f": "frequency == 0.3"})

@@ -306,6 +306,20 @@ def test_all_ep3_of_three_masses_are_found():
     assert ends == [pytest.approx([1.5, sign * height, 0.5, sign * height], abs=MET) for sign in (-1, 1)]
 
 
+# No better design
+
+
+def test_no_controller_of_two_masses_is_faster():
+    """Poles left of −v: p(t − v) has coefficients q ≥ 0, and a condition on them that none meets for v² > 3/5."""
+    v, t, *q = sp.symbols("v t q1:7", nonnegative=True)
+    shifted = sp.Poly(t**6 + sum(c * t ** (5 - k) for k, c in enumerate(q)), t).as_expr()
+    a = sp.Poly(sp.expand(shifted.subs(t, s + v)), s).all_coeffs()
+    p = polynomial("two_mass_spring").all_coeffs()
+    assert sp.expand(p[3] - 2 * p[1]) == 0  # the only condition: five parameters, six coefficients
+    condition = q[2] + 4 * v * q[1] + (10 * v**2 - 2) * q[0] + 4 * v * (5 * v**2 - 3)
+    assert sp.expand(a[3] - 2 * a[1] - condition) == 0  # each term positive for v² > 3/5
+
+
 @pytest.mark.parametrize("rate", [1e-3, 1e3])
 def test_twelve_roots_meet_whatever_the_unit_of_time(rate):
     """(s + rate)¹²: with the product of the roots held, their abscissa is least where all of them are equal."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.skates import FIXED, skate
+from helpers.texts import write
 
 import tmsopt
 from benchmarks.suites import hard_problem
@@ -111,12 +112,6 @@ minimize = "abscissa"
 """
 
 
-def written(tmp_path, text):
-    path = tmp_path / "asked.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def triple_abscissa(k_phi, k_deltadot):
     """By NumPy's eigenvalues, which scatter beside a triple root and are no better than it is."""
     D = np.array([[0.687, 0.667], [1.2108, 0.507 + k_deltadot]])
@@ -129,7 +124,7 @@ def test_a_triple_root_beside_zero_is_not_overlooked(seed, tmp_path):
     """Three starts agree at −0.2279, far from it."""
     known = triple_abscissa(0.06957112229, 0.19888527776)  # by differential evolution
     assert known < -0.34
-    found = tmsopt.solve(written(tmp_path, TRIPLE), seed=seed)
+    found = tmsopt.solve(write(tmp_path, TRIPLE), seed=seed)
     assert found.value <= known + 1e-6
     assert triple_abscissa(found.parameters["k_phi"], found.parameters["k_deltadot"]) == pytest.approx(
         found.value, abs=1e-3
@@ -139,7 +134,7 @@ def test_a_triple_root_beside_zero_is_not_overlooked(seed, tmp_path):
 @pytest.mark.parametrize("seed", range(2))
 def test_a_well_of_exponentials_beside_zero_is_found(seed, tmp_path):
     """s² + b s + 9 has the abscissa −b/2 for b < 6: −5/2 at x = 0, where b is 5; elsewhere b is 2.9 at most."""
-    assert tmsopt.solve(written(tmp_path, WELL), seed=seed).value == pytest.approx(-2.5, abs=1e-9)
+    assert tmsopt.solve(write(tmp_path, WELL), seed=seed).value == pytest.approx(-2.5, abs=1e-9)
 
 
 @pytest.mark.slow
@@ -147,7 +142,7 @@ def test_a_well_of_exponentials_beside_zero_is_found(seed, tmp_path):
 def test_an_optimum_is_not_lost_after_it_was_met(number, tmp_path):
     """The best of 60,000 designs, polished by SciPy on the eigenvalues, is no better."""
     problem = hidden()[number]
-    found = tmsopt.solve(written(tmp_path, problem.text), stability=0.0)
+    found = tmsopt.solve(write(tmp_path, problem.text), stability=0.0)
     assert problem.sign * found.value <= problem.sign * problem.value + 1e-7
 
 
