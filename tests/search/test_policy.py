@@ -285,7 +285,7 @@ def test_what_one_stage_draws_changes_no_other():
     refine, again, around = (sampling.stream(0, stage).random(4) for stage in ("refine", "refine", "around"))
     assert np.array_equal(refine, again)
     assert not np.array_equal(refine, around)
-    first, again, other = (POLICY.sample(replace(begun(), seed=seed)) for seed in (5, 5, 6))
+    first, again, other = (sampling.sample_box(wells().posed, seed) for seed in (5, 5, 6))
     assert np.array_equal(first.refined.u, again.refined.u)
     assert not np.array_equal(first.refined.u, other.refined.u)
 
