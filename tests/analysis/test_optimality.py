@@ -205,16 +205,6 @@ def test_no_sample_beside_a_strict_minimum_is_better(name, request):
     assert least_sampled(solution, (1e-2, 1e-5), count=6) > 0
 
 
-def test_a_smooth_minimum_beside_60_digits():
-    """One pair, one parameter: stationary, and the abscissa rises like the square of the step on both sides."""
-    solution = solved(fixed=CHI_H_1 | {"lambda_s": 0.3, "chi_B": 1.2}, free={"Fr": BOX["Fr"]}, minimize="abscissa")
-    found = judged(solution)
-    assert (found.verdict, found.order, found.conditions, found.unknowns) == (STRICT, 2, 1, 2)
-    for step in (1e-3, -1e-3):
-        a = polynomial_60(**dict(solution.parameters) | {"Fr": solution.parameters["Fr"] + step})
-        assert float(abscissa_60(a)) > solution.abscissa + 1e-9
-
-
 def certainly_better(solution, found):
     """Whether the better design that is named has a lower abscissa at 60 digits, in the box."""
     problem = solution.problem

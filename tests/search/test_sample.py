@@ -2,6 +2,7 @@
 
 import operator
 from importlib import import_module
+from itertools import product
 
 import casadi as ca
 import numpy as np
@@ -60,6 +61,13 @@ def test_the_designs_of_the_sample_are_counted():
     data = design.to_json()
     assert set(data["starts"]) == {"tried", "converged", "at_best", "expected_unseen"}
     assert data["looked"] == design.starts.looked == len(draw_box(asked.posed, 0).draws) > 2000
+
+
+def test_the_sample_has_all_corners_and_no_gap_of_a_tenth_on_a_face():
+    u = draw_box(problem().posed, 0).draws.u
+    assert set(product((0, 1), repeat=2)) <= set(map(tuple, u.tolist()))
+    for k, end in product((0, 1), repeat=2):
+        assert np.diff(np.sort(u[u[:, k] == end][:, 1 - k])).max() < 0.1
 
 
 # Nearer to limits, and better
