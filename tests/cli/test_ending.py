@@ -416,7 +416,7 @@ def test_what_cannot_be_written_is_named(name, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["new", "figure", "trace", "folder", "study"])
+@pytest.mark.parametrize("name", ["figure", "folder", "study"])
 def test_few_files_may_be_open(name, tmp_path):
     status, _, err = shell(f"ulimit -n 9; tmsopt {WORDS[name]}", tmp_path)
     assert status in (0, 2)

@@ -96,7 +96,7 @@ def test_odd_degrees_have_a_damping_ratio_of_1_where_all_roots_are_real(model, o
     assert design.value == pytest.approx(optimum, abs=TOLERANCE)
 
 
-@pytest.mark.parametrize("seed", [0, 5, 15, 17])
+@pytest.mark.parametrize("seed", [5, 17])
 def test_a_triple_root_that_is_there_for_rounding_alone_is_not_ahead_of_a_double_one(seed):
     """Beside z = c = 1 the cubic is (s + m)³ to ε³/27 at c = 1 + ε, with m = 1 + ε/3: by 1e-16 as far as ε = 1e-5."""
     free, goal = {"z": (0.05, 3.0), "c": (0.1, 3.0)}, "-min(damping_ratio, 0.8) - abs(abscissa - 0.1)"

@@ -27,7 +27,6 @@ def weaving(d):
 
 QUANTITIES = {"abscissa": abscissa, "damping_ratio": damping_ratio, "Fr_c": weaving}
 QUESTIONS = {
-    "slowest that decays": ("minimize", "Fr", ["abscissa <= -0.5"]),
     "decay in a band, and some sway": (
         "minimize",
         "chi_B",
@@ -38,7 +37,6 @@ QUESTIONS = {
     "decays most, and sways": ("minimize", "abscissa", ["damping_ratio <= 0.3"]),
     "sways most, and decays": ("minimize", "damping_ratio", ["abscissa <= -0.5"]),
     "sways least at its speed": ("maximize", "damping_ratio", ["Fr == 1.5"]),
-    "slowest that hardly sways": ("minimize", "Fr", ["damping_ratio >= 0.7"]),
     "slowest weaving": ("minimize", "Fr_c", ["abscissa <= -0.3"]),
     "weighted": ("minimize", "abscissa + 1.5*Fr", []),
     "weighted with sway": ("maximize", "damping_ratio - abscissa - 2*Fr + chi_B/10", []),

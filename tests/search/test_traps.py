@@ -211,7 +211,7 @@ ROBOT = tmsopt.Problem(
 )
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 3))])
+@pytest.mark.parametrize("seed", [0, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_double_pair_in_a_needle_is_found(seed):
     assert tmsopt.solve(NEEDLE, seed=seed, stability=0.0).value <= DEEPEST
 
@@ -228,7 +228,7 @@ def test_both_root_quantities_at_their_best_at_one_design():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("goal", ["v", "m_H", "x_B", "-lambda_s"])
+@pytest.mark.parametrize("goal", ["v", "-lambda_s"])
 def test_a_needle_about_the_least_abscissa_is_not_called_empty(goal):
     """The least abscissa is -3.1251038, proved, so -3.125 leaves a needle, at whose end every goal is nearly what it is.
 

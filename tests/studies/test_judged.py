@@ -28,13 +28,13 @@ def built(rows, share=1.0, **more):
 
 def whipple():
     design = solve(PROBLEMS / "whipple_ep4.toml")
-    return monte_carlo(design, 40, 2, tolerances={n: abs(x) / 100 for n, x in design.parameters.items() if x})
+    return monte_carlo(design, 20, 2, tolerances={n: abs(x) / 100 for n, x in design.parameters.items() if x})
 
 
 def limited():
     problem = solve(PROBLEMS / "realistic.toml").problem
     design = solve(problem)
-    return monte_carlo(design, 60, 3, tolerances={n: abs(x) / 500 for n, x in design.parameters.items() if x})
+    return monte_carlo(design, 30, 3, tolerances={n: abs(x) / 500 for n, x in design.parameters.items() if x})
 
 
 def own(limits=None, **asked):
@@ -55,8 +55,8 @@ def constant():
 
 
 STUDIES = {
-    "EP4 as built": lambda: built(60),
-    "very near EP4": lambda: built(40, 1e-6),
+    "EP4 as built": lambda: built(30),
+    "very near EP4": lambda: built(20, 1e-6),
     "wheels": whipple,
     "limits": limited,
     "constants": constant,
