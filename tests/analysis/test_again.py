@@ -10,7 +10,7 @@ OSCILLATOR = models.from_coefficients(["1", "2 + x/1000", "2 + y/1000"], name="o
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["realistic", "point_mass_robot", "heavily_damped"])
+@pytest.mark.parametrize("name", ["realistic", "heavily_damped"])
 def test_gains_are_those_of_a_search_of_each_moved_problem(name):
     solution = tmsopt.solve(f"problems/{name}.toml")
     levers = [lever for lever in tmsopt.explain(solution).levers if lever.step]

@@ -12,11 +12,10 @@ from helpers.hunt import PROBLEMS
 from helpers.oracles import polynomial_60
 from helpers.structures import FORMS, native_60, pair, quantities_60, times
 from mpmath import mp
+from mpmath.calculus.optimization import jacobian
 
 import tmsopt
 from tmsopt.models import from_coefficients
-
-STEP = mp.mpf(10) ** -20  # of central differences at 80 digits: slopes right to 38
 
 
 def names_60(parameters, unknowns):
@@ -58,14 +57,8 @@ def gains_60(data, problem):
         return found
 
     y = [mp.mpf(data["parameters"][name]) for name in free] + list(unknowns)
-    slopes = []
-    for k in range(len(y)):
-        ahead, behind = list(y), list(y)
-        ahead[k] += STEP
-        behind[k] -= STEP
-        slopes.append([(a - b) / (2 * STEP) for a, b in zip(every(ahead), every(behind), strict=True)])
-    matrix = mp.matrix([row[1:] for row in slopes])
-    weights = mp.lu_solve(matrix, mp.matrix([-row[0] for row in slopes]))  # least squares where there is freedom left
+    slopes = jacobian(mp, lambda *y: mp.matrix(every(y)), y).T  # by differences of half the digits
+    weights = mp.lu_solve(slopes[:, 1:], -slopes[:, 0])  # least squares where there is freedom left
     return {name: weights[4 + k] for k, name in enumerate(data["active"])}
 
 

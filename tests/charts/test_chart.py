@@ -4,8 +4,6 @@ import csv
 import dataclasses
 import json
 import math
-from fractions import Fraction
-from math import comb
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +17,7 @@ from tmsopt.charts import chart
 from tmsopt.errors import InputError
 from tmsopt.models import tms
 from tmsopt.problem import Problem, load
-from tmsopt.roots import CLASSES, classify, find_motion
+from tmsopt.roots import CLASSES
 
 BASE = {"chi_H": 1.0, "zeta_B": -0.4, "zeta_H": -0.2, "mu": 0.1}
 SQRT2 = math.sqrt(2)
@@ -110,56 +108,6 @@ def test_a_singular_mass_matrix_is_undefined():
     json.dumps(everywhere.to_json(), allow_nan=False)
 
 
-def test_standing_still_is_unstable():
-    """Fr = 0: a1 = a3 = 0, roots in pairs ±s, never asymptotically stable."""
-    found = charted(BASE | {"chi_B": 1.3}, {"Fr": (0.0, 1.0), "lambda_s": (0.1, 1.0)}, points=(3, 20))
-    for i in range(20):
-        a = exact_polynomial({**BASE, "chi_B": 1.3, "Fr": 0.0, "lambda_s": float(found.grid[1][i])})
-        assert CLASSES[found.kind[i, 0]] == curves.kind(a)
-        assert found.kind[i, 0] < CLASSES.index("stable")
-
-
-@pytest.mark.parametrize("distance", [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
-def test_beside_ep4_roots_are_jointly_right_and_classes_exact(distance):
-    """(s − ω0)⁴ with coefficients moved: the roots of the very doubles, isolated exactly.
-
-    A backward error of a few units of rounding moves a 4-fold root by its fourth root, and a root that is δ^(1/4)
-    from the others by that unit over δ^(3/4).
-    """
-    rng = np.random.default_rng(3)
-    c = np.array([comb(4, k) * (-OMEGA0) ** k for k in range(5)]) * np.ones((12, 1))
-    c[:, 1:] *= 1 + distance * rng.uniform(-1, 1, (12, 4))
-    found = classify(list(c.T))
-    unit = 20 * np.finfo(float).eps
-    tolerance = abs(OMEGA0) * min(unit**0.25, 4 * unit / max(distance, 1e-300) ** 0.75)
-    for row, code, count, value in zip(c, found.kind, found.real_roots, find_motion(list(c.T)).abscissa, strict=True):
-        exact = [Fraction(x) for x in row.tolist()]
-        assert CLASSES[code] == curves.kind(exact)
-        assert count == sum(sturm(exact))
-        assert value == pytest.approx(max(float(z.real) for z, _ in certified_roots(exact)), abs=tolerance)
-
-
-def test_classify_by_hand():
-    rows = {
-        (1, 10, 35, 50, 24): ("heavily damped", 4, -1.0),  # −1 −2 −3 −4
-        (-1, -10, -35, -50, -24): ("heavily damped", 4, -1.0),
-        (1, 4, 8, 8, 3): ("stable", 2, -1.0),  # (s + 1)² is not 2 roots more: (s+1)²(s²+2s+3)
-        (1, 0, 5, 0, 4): ("weave", 0, 0.0),  # ±i ±2i: not asymptotically stable
-        (1, 6, 11, 6, 0): ("capsize", 4, 0.0),  # 0 −1 −2 −3
-        (1, -1, 1, -1, 0): ("capsize", 2, 1.0),  # 0, 1, ±i
-        (1, 0, 0, 0, -1): ("capsize", 2, 1.0),
-        (0, 1, 2, 3, 4): ("undefined", 0, math.nan),
-        (1, -2, 3, -2, 2): ("weave", 0, 1.0),  # ±i, 1 ± i
-    }
-    a = np.array(list(rows), dtype=float).T
-    found = classify(list(a))
-    assert [CLASSES[k] for k in found.kind] == [v[0] for v in rows.values()]
-    expected_real = [1 if k == (1, 4, 8, 8, 3) else v[1] for k, v in rows.items()]
-    assert found.real_roots.tolist() == expected_real  # different ones
-    assert find_motion(list(a)).abscissa == pytest.approx([v[2] for v in rows.values()], abs=1e-7, nan_ok=True)
-    assert classify([[1.0, np.inf], [np.nan, 1.0], 1.0, 1.0, 1.0]).kind.tolist() == [0, 0]
-
-
 def test_constraints_are_held_where_they_hold():
     constraints = {"fast": "Fr >= 1.2 * Fr_c", "tilt": "tan(lambda_s) + Fr <= 3", "rate": "abscissa <= -0.3"}
     fixed, free = PLANES["on the law"]
@@ -180,19 +128,6 @@ def test_least_abscissa_is_the_least():
     roots = [float(z.real) for z, _ in certified_roots(exact_polynomial(design))]
     assert best["value"] == pytest.approx(max(roots), abs=1e-9)
     assert best["value"] == found.abscissa.min() >= OMEGA0  # `w0` bounds them all
-
-
-def test_the_archive_reads_back_with_named_axes(tmp_path):
-    path = tmp_path / "chart.npz"
-    charted(*PLANES["both tilts"], axes=("lambda_s", "chi_B"), points=(9, 6)).save(path)
-    with np.load(path, allow_pickle=False) as data:
-        assert np.array_equal(data["lambda_s"], np.linspace(-1.4, 1.4, 9))
-        assert np.array_equal(data["chi_B"], np.linspace(-1, 3, 6))
-        assert data["kind"].shape == (6, 9)
-        about = json.loads(str(data["about"]))
-    assert about["dimensions"] == ["chi_B", "lambda_s"]
-    assert about["classes"] == list(CLASSES)
-    assert about["fixed"]["Fr"] == FR_EP4 + 0.5
 
 
 @pytest.mark.parametrize(
@@ -230,20 +165,6 @@ def test_trace_writes_table_csv_and_figure(tmp_path, run):
     assert "EP4" in ep4["event"]
 
 
-def test_trace_json_is_finite_and_of_another_pattern_where_asked(run):
-    status, out, err = run("trace", "problems/off_law.toml", "--pattern", "weave", "--starts", 8, "--json")
-    assert (status, err) == (0, "")
-    data = json.loads(out, parse_constant=pytest.fail)
-    assert data["schema"] == 1
-    assert data["pattern"] == "weave"
-    assert data["free"] == ["Fr", "lambda_s"]
-    (branch,) = data["branches"]
-    assert branch["points"] == len(branch["columns"]["Fr"]) == data["points"]
-    x = SQRT2 - 0.1
-    for Fr, angle in zip(branch["columns"]["Fr"], branch["columns"]["lambda_s"], strict=True):
-        assert Fr**2 == pytest.approx(0.2 / (0.4 - 0.2 * x) * x / (x - 1) * math.tan(angle), rel=1e-12)  # `Frc1`
-
-
 NOTHING = """
 [parameters]
 chi_H = 1.0
@@ -265,23 +186,6 @@ def test_nothing_found_ends_with_3_and_says_so(tmp_path, run):
     assert json.loads(out)["branches"] == []
 
 
-@pytest.mark.slow
-def test_chart_writes_table_archive_and_figure(tmp_path):
-    archive, figure = tmp_path / "chart.npz", tmp_path / "chart.png"
-    done = tmsopt(
-        "chart", "problems/chart.toml", "--points", "40x30", "-o", archive, "--plot", figure, "--axes", "lambda_s,Fr"
-    )
-    assert done.returncode == 0
-    assert done.stderr.splitlines() == [f"wrote {archive}", f"wrote {figure}"]
-    assert "heavily damped" in done.stdout
-    assert "EP4" in done.stdout
-    assert "0.410677532" in done.stdout  # arctan(15/4 − 75√2/32)
-    assert figure.read_bytes().startswith(b"\x89PNG")
-    with np.load(archive) as data:
-        assert data["kind"].shape == (30, 40)
-        assert (data["lambda_s"][0], data["lambda_s"][-1]) == (0.01, 1.4)
-
-
 def test_chart_json_is_finite(run):
     status, out, err = run("chart", "problems/chart.toml", "--points", "30", "--no-boundaries", "--json")
     assert (status, err) == (0, "")
@@ -289,36 +193,6 @@ def test_chart_json_is_finite(run):
     assert data["axes"]["Fr"] == {"min": 0.01, "max": 5.0, "points": 30, "unit": "1"}
     assert sum(data["classes"].values()) == pytest.approx(1)
     assert data["boundaries"] is None
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ("trace problems/ep_set.toml --pattern EP9", "unknown pattern 'EP9'"),
-        ("trace problems/ep_set.toml --pattern EP2", "2 free parameters"),
-        ("trace problems/chart.toml", "no pattern to trace"),
-        (
-            "trace problems/ep_set.toml --plot x.png --axes Fr,mu",
-            "accepted: two of the free parameters",
-        ),
-        ("trace problems/ep_set.toml --csv no/such/x.csv", "does not exist"),
-        ("trace problems/ep_set.toml --csv x.txt", "ending in csv"),
-        ("trace problems/ep_set.toml --step 0.5", "--step"),
-        ("trace nothing.toml", "nothing.toml"),
-        ("chart problems/chart.toml --axes Fr,Fr", "accepted: Fr and lambda_s"),
-        (
-            "chart problems/chart.toml --points 1",
-            "--points: found (1, 1); accepted: two whole numbers, each from 2",
-        ),
-        ("chart problems/chart.toml --points 40by30", "of at least 2"),
-        ("chart problems/chart.toml --output problems/x.csv", "ending in npz"),
-        (f"chart problems/chart.toml --points 5 -o {'x' * 300}.npz", "--output"),
-    ],
-)
-def test_bad_input_ends_with_2_and_says_what_is_accepted(arguments, words, run):
-    status, out, err = run(*arguments.split())
-    assert (status, out) == (2, "")
-    assert words in " ".join(err.split())
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full")

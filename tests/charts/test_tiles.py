@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from helpers.charts import EXTRA, FIXED, PLANE, POINTS, SPACE, charted, files
 
-from tmsopt.charts import LAYERS, Grid, add_tallies, chart, count_tile, open_chart, plan_survey
+from tmsopt.charts import LAYERS, chart, open_chart, plan_survey
 from tmsopt.errors import InputError
 from tmsopt.models import Model, Parameter, ParameterSet, Quantity
-from tmsopt.problem import Problem, array_function
-from tmsopt.roots import CLASSES
+from tmsopt.problem import Problem
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +50,7 @@ def test_quantities_are_those_of_every_design(whole):
 
 def test_three_axes_are_planes_one_above_the_other(tmp_path):
     axes, points = ("chi_B", "lambda_s", "Fr"), (9, 7, 5)
-    found = chart(SPACE, axes, folder=tmp_path / "space.chart", points=points, tile=31, quantities={"x": "Fr_c"})
+    found = chart(SPACE, axes, folder=tmp_path / "space.chart", points=points, tile=31)
     assert found.layers["kind"].shape == (5, 7, 9)
     assert found.about["dimensions"] == ["Fr", "lambda_s", "chi_B"]
     for k, Fr in enumerate(found.grid[2]):
@@ -63,25 +62,10 @@ def test_three_axes_are_planes_one_above_the_other(tmp_path):
         flat = chart(plane, axes[:2], points=points[:2], boundaries=False)
         for name in ("kind", "abscissa", "damping_ratio", "real_roots", "satisfied"):
             assert found.layers[name][k].tobytes() == getattr(flat, name).tobytes()
-        function = array_function(plane.posed, {"x": "Fr_c"})
-        x, y = np.meshgrid(*flat.grid)
-        critical = function(plane.posed.ordered({"chi_B": x, "lambda_s": y}))["x"]
-        assert np.array_equal(found.layers["x"][k], critical, equal_nan=True)
     best = found.to_json()["least_abscissa"]
     assert best["value"] == found.layers["abscissa"].min()
     place = np.unravel_index(np.argmin(found.layers["abscissa"]), (5, 7, 9))
     assert [best[n] for n in axes] == [v[k] for v, k in zip(found.grid, place[::-1], strict=True)]
-
-
-def test_a_grid_knows_its_designs():
-    grid = Grid(("x", "y", "z"), (np.arange(4.0), np.arange(10, 13.0), np.arange(20, 22.0)))
-    arrays = dict(zip("zyx", np.meshgrid(*grid.values[::-1], indexing="ij"), strict=True))
-    assert grid.shape == arrays["x"].shape == (2, 3, 4)
-    rows = grid.columns(range(1, 5))
-    for name, array in arrays.items():
-        assert np.array_equal(np.broadcast_to(rows[name], (4, 4)), array.reshape(6, 4)[1:5])
-    assert grid.design(17) == {name: array.flat[17] for name, array in arrays.items()}
-    assert [r for tile in grid.tiles(9) for r in tile] == list(range(6))
 
 
 def test_single_precision_is_the_double_rounded(whole, tmp_path):
@@ -101,21 +85,6 @@ def test_only_what_is_asked_for_is_kept(tmp_path):
     other = charted(tmp_path / "other.chart", layers=(), quantities={"x": "Fr"})
     assert list(other.layers) == ["x"]
     assert other.shares == {}
-
-
-def test_counts_are_those_of_the_arrays():
-    rng = np.random.default_rng(0)
-    kind, satisfied = rng.integers(0, 5, (6, 10)).astype(np.int8), rng.random((6, 10)) < 0.5
-    abscissa = rng.normal(size=(6, 10)).round(1)
-    abscissa[2] = np.nan
-    layers = {"kind": kind, "satisfied": satisfied, "abscissa": abscissa}
-    parts = [count_tile({n: a[k : k + 2] for n, a in layers.items()}, 10 * k, 1) for k in (4, 0, 2)]
-    found = add_tallies(parts)
-    allowed = np.where(satisfied, abscissa, np.nan)
-    assert (found.least, found.place) == (np.nanmin(allowed), np.nanargmin(allowed))
-    assert found.shares == {n: np.mean(kind == k) for k, n in enumerate(CLASSES)}
-    assert (found.satisfied, found.designs, found.fallbacks) == (satisfied.sum(), 60, 3)
-    assert count_tile({"abscissa": np.full((2, 2), np.nan)}, 0).place == -1
 
 
 OSCILLATOR = Model(

@@ -57,7 +57,7 @@ def test_another_word_for_colours_is_refused(run):
     assert all(word in err for word in ("auto", "always", "never"))
 
 
-@pytest.mark.parametrize("command", ["speeds", "study"])
+@pytest.mark.parametrize("command", ["speeds", pytest.param("study", marks=pytest.mark.slow)])
 def test_a_report_fits_the_terminal(command, tmp_path):
     file = tmp_path / "few.toml"
     file.write_text((ROOT / "problems" / f"{FILES[command]}.toml").read_text().replace("rows = 32", "rows = 4"))

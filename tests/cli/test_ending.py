@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from importlib import import_module
-from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -255,24 +254,6 @@ def test_a_proof_that_is_stopped_leaves_the_design(run, monkeypatch, where, tmp_
 
 
 @pytest.mark.slow
-def test_a_front_that_is_stopped_leaves_what_is_known(run, monkeypatch):
-    """Its two ends, and the points between them that were found before; none of them dominates another."""
-    curve = import_module("tmsopt.fronts.curve")
-    probe = curve._Search.probe
-
-    def third(search, *words, **more):
-        return probe(search, *words, **more) if len(search.probes) < 2 else (press(), time.sleep(LONG))
-
-    monkeypatch.setattr(curve._Search, "probe", third)  # of rounds: one sub-problem, then two
-    status, out, _ = run("solve", "problems/pareto.toml", "--starts", "1", "--json")
-    data = json.loads(out)
-    values = [p["objectives"] for p in data["points"]]
-    assert (status, data["interrupted"], data["solved"]) == (130, True, 5)
-    assert 2 <= len(values) <= 5
-    assert all(a[0] < b[0] and a[1] > b[1] for a, b in pairwise(values))
-
-
-@pytest.mark.slow
 def test_what_is_said_beside_a_design_may_be_stopped(run, monkeypatch):
     monkeypatch.setattr(
         import_module("tmsopt.documents.analysis"), "explain", lambda *_, **__: (press(), time.sleep(LONG))
@@ -435,7 +416,7 @@ def test_what_cannot_be_written_is_named(name, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["new", "figure", "trace", "folder", "study"])
+@pytest.mark.parametrize("name", ["figure", "folder", "study"])
 def test_few_files_may_be_open(name, tmp_path):
     status, _, err = shell(f"ulimit -n 9; tmsopt {WORDS[name]}", tmp_path)
     assert status in (0, 2)

@@ -65,31 +65,15 @@ COMMANDS = {
     "full": ("solve {p}/realistic.toml --full", {"moving limits", "splitting roots"}),
     "plot": ("solve {p}/ep4.toml --plot growth.png", {"following the roots", "writing the file of --plot"}),
     "report": ("solve {p}/ep4.toml --report page.html", {"writing the file of --report", "writing the page"}),
-    "all": ("solve {p}/ep4_matching.toml --all", {"proving that no design is missed"}),
-    "infeasible": ("solve infeasible.toml --starts 4", {"searching for the smallest change of limits"}),
     "front": ("solve {p}/pareto.toml --points 3", {"following the front"}),
     "chart": ("chart {p}/chart.toml --points 60x50", {"charting", "tracing weave", "tracing capsize", "tracing EP2"}),
-    "trace": ("trace {p}/ep_set.toml", {"tracing 2EP2"}),
-    "encircle": ("encircle {p}/loss_only_dimer.toml", {"searching", "searching inside the loop"}),
-    "sheets": ("sheets {p}/loss_only_dimer.toml", {"searching", "computing eigenvalues"}),
     "study": ("study study.toml", {"solving rows"}),
-    "monte carlo": ("study built.toml", {"searching", "solving rows"}),
     "figure": ("figure growth --output growth.png", {"drawing"}),
-    "prove": ("prove {p}/ep4.toml", {"searching", "proving to 30 digits"}),
-    "explore": ("explore {p}/ep4.toml -o page.html", {"looking for other designs", "writing the page"}),
-    "compare": ("compare {p}/ep4.toml", {"searching", "comparing"}),
-    "diagnose": ("diagnose {p}/ep4.toml", {"searching", "splitting roots"}),
-    "simulate": ("simulate {p}/realistic.toml", {"searching", "following the motion"}),
-    "speeds": ("speeds {p}/realistic.toml", {"searching", "isolating speeds"}),
     "verify": ("verify --only tab1-*", {"recomputing claims"}),
 }
 """Words of the command line, and what a terminal is to show of it."""
 
-FILES = {
-    "study": 'problem = "{p}/ep4.toml"\n[vary]\nmu = [0.1, 0.2, 0.3]\n',
-    "built": 'problem = "{p}/ep4.toml"\n[study]\nmethod = "monte_carlo"\nrows = 20\n[tolerances]\nmu = 0.01\n',
-    "infeasible": (PROBLEMS / "ep4.toml").read_text() + '[constraints]\ndecay = "abscissa <= -100"\n',
-}
+STUDY = 'problem = "{p}/ep4.toml"\n[vary]\nmu = [0.1, 0.2, 0.3]\n'
 
 
 def into_pipes(args, folder):
@@ -124,8 +108,7 @@ def test_something_is_shown_within_a_second_whatever_takes_long(tmp_path):
 def test_long_commands_say_what_they_do_and_leave_nothing(name, tmp_path):
     """The same is written as into pipes, but for the line that is gone in the end."""
     text, whats = COMMANDS[name]
-    for file, content in FILES.items():
-        (tmp_path / f"{file}.toml").write_text(content.replace("{p}", str(PROBLEMS)))
+    (tmp_path / "study.toml").write_text(STUDY.format(p=PROBLEMS))
     args = text.format(p=PROBLEMS).split()
     loaded = _loaded(tmp_path)
     seen = on_a_terminal(args, tmp_path, SLOW_AT_WORK)
@@ -154,10 +137,10 @@ def test_a_narrow_terminal_has_one_line_of_it(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("interruptible")
-@pytest.mark.parametrize("text", ["compare {p}/ep4.toml", "prove {p}/ep4.toml", "trace {p}/ep_set.toml", "verify"])
+@pytest.mark.parametrize("text", ["prove {p}/ep4.toml", "verify"])
 def test_ctrl_c_is_answered_with_a_line(text, tmp_path):
     """The line of progress is gone, and one says that the command was stopped."""
-    what = {"trace": "tracing", "verify": "recomputing"}.get(text.split(maxsplit=1)[0], "looking at designs")
+    what = "recomputing" if text == "verify" else "looking at designs"
     seen = on_a_terminal(text.format(p=PROBLEMS).split(), tmp_path, SLOW_AT_WORK, stop=what)
     assert seen.status == 130
     assert seen.screen == "stopped; all text printed before is valid\n"

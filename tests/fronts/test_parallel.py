@@ -10,7 +10,7 @@ from helpers import shares
 
 import tmsopt
 from tmsopt import InputError
-from tmsopt.executor import EngineError, in_process, processes
+from tmsopt.executor import in_process
 from tmsopt.models import tms
 
 curve = import_module("tmsopt.fronts.curve")
@@ -26,28 +26,6 @@ ASK = subproblems.FrontSolver(PROBLEM, options.Options())
 
 def map_items(function, items, workers):
     return dict(subproblems.map_items(workers, function, ASK, items))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("workers", [in_process, lambda: processes(3)])
-def test_every_item_has_its_answer(workers):
-    with workers() as side_by_side:
-        found = map_items(shares.squared, range(9), side_by_side)
-    assert {k: square for k, (square, _) in found.items()} == {k: k**2 for k in range(9)}
-
-
-@pytest.mark.slow
-def test_processes_share_the_work():
-    with processes(2) as side_by_side:
-        workers = [pid for _, pid in map_items(shares.slowly_squared, range(8), side_by_side).values()]
-    assert len(set(workers)) == 2
-    assert os.getpid() not in workers
-
-
-@pytest.mark.slow
-def test_an_item_that_ends_its_processes_is_an_error():
-    with processes(2) as side_by_side, pytest.raises(EngineError, match="exit code 3"):
-        map_items(shares.dying_at_two, range(9), side_by_side)
 
 
 def test_what_cannot_be_sent_is_solved_here():

@@ -8,6 +8,7 @@ import pytest
 
 import tmsopt
 from tmsopt.models import from_coefficients
+from tmsopt.roots import roots
 
 none_stable = import_module("tmsopt.global_search.signs").has_no_stable_design
 
@@ -20,14 +21,10 @@ def stated(coefficients, free, **asked):
 
 
 def least_abscissa(terms):
-    """Least abscissa on a grid of [−1, 1]², of coefficients c0 + c1 x + c2 y + c3 x y, by NumPy's eigenvalues."""
+    """Least abscissa on a grid of [−1, 1]², of coefficients c0 + c1 x + c2 y + c3 x y, by numeric roots."""
     u, v = np.meshgrid(*[np.linspace(-1, 1, GRID)] * 2)
     a = np.tensordot(np.stack([np.ones_like(u), u, v, u * v], axis=-1), terms, axes=(-1, 1)).reshape(GRID**2, -1)
-    a = a[a[:, 0] != 0]
-    companion = np.zeros((len(a), len(terms) - 1, len(terms) - 1))
-    companion[:, 0] = -a[:, 1:] / a[:, :1]
-    companion[:, range(1, len(terms) - 1), range(len(terms) - 2)] = 1
-    return float(np.linalg.eigvals(companion).real.max(axis=1).min())
+    return float(roots(a[a[:, 0] != 0]).real.max(axis=1).min())
 
 
 @pytest.mark.slow

@@ -36,9 +36,7 @@ def find_damped(most, known=None, **asked):
         (DAMPED, {"x": (0, 1)}, {}),
         (DAMPED, {"x": (0, 3)}, {"constraints": {"most": "x <= 1.9"}}),
         (DAMPED, {"x": (0, 1)}, {"constraints": {"decay": "abscissa <= -0.1"}, "minimize": "x"}),
-        ((-1, 2 - X, -1), {"x": (0, 1)}, {}),  # the same with a0 < 0
         ((1, X - Y, 1), {"x": (0, 1.5)}, {"scenarios": {"y": (1.0, 2.0)}}),  # stable at y = 1 alone
-        ((1, X, 1, 1), {"x": (0, 0.9)}, {}),  # Hurwitz: x > 1
         ((1, X, Y, 1), {"x": (0, 2), "y": (0, 2)}, {"constraints": {"hyperbola": "x*y <= 0.9"}}),  # x y > 1
         ((1, X - 2, Y), {"x": (0, 3), "y": (0, 3)}, {"constraints": {"curve": "x**2 + y == 2"}}),  # x ≤ √2
     ],

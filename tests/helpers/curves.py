@@ -6,12 +6,11 @@ matrices, with T = tan(lambda_s); tilts are given in rad and turned into T at 40
 
 from fractions import Fraction
 from functools import cache
-from itertools import pairwise
 
 import flint
 import numpy as np
 import sympy
-from helpers.oracles import routh_exact, symbolic_copo
+from helpers.oracles import rational_polynomial, routh_exact, symbolic_copo
 from mpmath import mp
 
 DIGITS = 40
@@ -142,41 +141,13 @@ _EXACT = sympy.lambdify(list(SYMBOLS.values()), COPO, modules="math")
 
 
 def sturm(coefficients):
-    """Numbers of different real roots below, at and above 0, by Sturm's theorem in Fractions."""
+    """Numbers of different real roots below, at and above 0: FLINT isolates roots, and the imaginary part of a real one is 0."""
     p = [Fraction(c) for c in coefficients]
-    zero = 0
+    zero = int(p[-1] == 0)
     while p[-1] == 0:
         p.pop()
-        zero = 1
-    n = len(p) - 1
-    if n == 0:
-        return 0, zero, 0
-    chain = [p, [c * (n - k) for k, c in enumerate(p[:-1])]]
-    while len(chain[-1]) > 1:
-        r = _remainder(chain[-2], chain[-1])
-        if not r:
-            break  # a multiple root: the chain ends in a common factor, and still counts each root once
-        chain.append([-c for c in r])
-    minus = _changes([q[0] * (-1) ** (len(q) - 1) for q in chain])
-    middle, plus = _changes([q[-1] for q in chain]), _changes([q[0] for q in chain])
-    return minus - middle, zero, middle - plus
-
-
-def _remainder(p, q):
-    p = list(p)
-    while len(p) >= len(q):
-        ratio = p[0] / q[0]
-        for k, c in enumerate(q):
-            p[k] -= ratio * c
-        p.pop(0)
-    while p and p[0] == 0:
-        p.pop(0)
-    return p
-
-
-def _changes(values):
-    signs = [v > 0 for v in values if v != 0]
-    return sum(a != b for a, b in pairwise(signs))
+    found = [z.real for z, _ in rational_polynomial(p).complex_roots() if z.imag == 0]
+    return sum(x < 0 for x in found), zero, sum(x > 0 for x in found)
 
 
 def stable(a):

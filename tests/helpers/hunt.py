@@ -65,21 +65,18 @@ def roots(design):
     with np.errstate(divide="ignore", invalid="ignore"):
         companion[..., 0, :] = np.moveaxis(np.nan_to_num(-a[1:] / a[0], nan=1e9, posinf=1e9, neginf=-1e9), 0, -1)
     companion[..., (1, 2, 3), (0, 1, 2)] = 1.0
-    found = np.linalg.eigvals(companion)
-    return found
+    return np.linalg.eigvals(companion)
 
 
 def abscissa(design):
     """Largest real part of the roots; scattered by 4e-4 at an EP4, 1e-5 at an EP3, 1e-8 at an EP2."""
-    found = roots(design).real.max(axis=-1)
-    return found
+    return roots(design).real.max(axis=-1)
 
 
 def damping_ratio(design):
     """Least -Re s/|s| of the roots."""
     s = roots(design)
-    found = (-s.real / np.abs(s)).min(axis=-1)
-    return found
+    return (-s.real / np.abs(s)).min(axis=-1)
 
 
 def centre(design):
@@ -125,12 +122,8 @@ def least(
     rounds=6,
     shrink=0.2,
     population=12,
-    start=None,
 ):
-    """The best design and its value: differential evolution in the box, then `rounds` times in a smaller one around it.
-
-    With a `start`, the first round is around that design already, in a box of the width `shrink`.
-    """
+    """The best design and its value: differential evolution in the box, then `rounds` times in a smaller one around it."""
     names = list(box)
     low, high = np.array([box[n] for n in names]).T
 
@@ -139,9 +132,6 @@ def least(
         return np.where(violation > 0, 1e3 + violation, value)
 
     centre_, width, best = None, 1.0, np.inf
-    if start is not None:
-        centre_, width = np.array([start[n] for n in names]), shrink
-        best = float(cost(centre_[:, None])[0])
     for turn in range(rounds + 1):
         around = centre_ if centre_ is not None else (low + high) / 2
         half = (high - low) / 2 * width
@@ -168,33 +158,3 @@ def least(
         width *= shrink
     assert centre_ is not None
     return {**fixed, **dict(zip(names, map(float, centre_), strict=True))}, best
-
-
-def placed(zeta_B, zeta_H, chi_H, gamma, beta_1, kappa_1, beta_2, kappa_2):
-    """The two designs whose roots are those of t² + β t + κ, twice, with t = s - γ; chi_H not 1.
-
-    The coefficients `copo` set equal to a0 times those of the product: a3/a1 gives chi_B, a1 and a4 give Fr and mu
-    linear in u = zeta_H T - (chi_H - 1), and a2 leaves a quadratic in u. Where nothing real exists, nan.
-    """
-    k, fall = chi_H - 1, zeta_B - zeta_H
-    p1, q1, p2, q2 = (
-        beta_1 - 2 * gamma,
-        kappa_1 - beta_1 * gamma + gamma**2,
-        beta_2 - 2 * gamma,
-        kappa_2 - beta_2 * gamma + gamma**2,
-    )
-    b1, b2, b3, b4 = p1 + p2, q1 + q2 + p1 * p2, p1 * q2 + p2 * q1, q1 * q2
-    with np.errstate(all="ignore"):
-        chi_B = chi_H * (1 - b3 / b1 * zeta_B) / (1 - b3 / b1 * zeta_H)
-        F = -b1 * zeta_B / (zeta_B * chi_H - zeta_H * chi_B)  # Fr = F u
-        square = F**2 * fall * zeta_B
-        linear = -zeta_B * (zeta_B + zeta_H) / zeta_H - b4 * zeta_B**2 * zeta_H + zeta_B + b2 * zeta_B**2
-        constant = -k * zeta_B * fall / zeta_H
-        root = np.sqrt(linear**2 - 4 * square * constant)
-        designs = []
-        for u in ((-linear + root) / (2 * square), (-linear - root) / (2 * square)):
-            T = (u + k) / zeta_H
-            mu = (b4 * u * zeta_B**2 - zeta_B * T) / k
-            found = {"Fr": F * u, "mu": mu, "chi_B": chi_B, "lambda_s": np.arctan(T)}
-            designs.append({**found, "chi_H": chi_H, "zeta_B": zeta_B, "zeta_H": zeta_H})
-    return designs

@@ -7,9 +7,9 @@ Source of the model: O. N. Kirillov (2018), equation `matrices`.
 """
 
 from fractions import Fraction
-from math import prod
 
 import flint
+import numpy as np
 import sympy  # type: ignore[import-untyped]
 from mpmath import mp
 
@@ -124,24 +124,23 @@ def elementary(roots):
 
 
 def weave_Fr_60(mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s):
-    """The Froude number in (1e-3, 1e3) where the Hurwitz determinant of the 60-digit polynomial vanishes.
+    """The Froude number at which the Hurwitz determinant of the 60-digit polynomial vanishes; None where it has no zero.
 
-    By root finding on the speed alone; no formula for it is used. None where the determinant keeps its sign.
+    Over Fr² the determinant is linear in Fr², so its values at two speeds tell the zero.
     """
 
-    def determinant(logarithm):
-        Fr = mp.exp(logarithm)
-        a0, a1, a2, a3, a4 = polynomial_60(Fr, mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
-        return (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4) / Fr**2  # the factor Fr^2 hides the zero from bisection
+    def determinant(Fr):
+        a0, a1, a2, a3, a4 = polynomial_60(mp.mpf(Fr), mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s)
+        return (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4) / Fr**2
 
-    with mp.workdps(DIGITS):
-        low, high = mp.log(mp.mpf("1e-3")), mp.log(mp.mpf("1e3"))
-        if determinant(low) * determinant(high) >= 0:
-            return None
-        for _ in range(20):  # a bracket narrow enough for the fast iteration to stay inside
-            middle = (low + high) / 2
-            low, high = (low, middle) if determinant(low) * determinant(middle) <= 0 else (middle, high)
-        return mp.exp(mp.findroot(determinant, (low, high), solver="anderson", tol=mp.mpf(10) ** -100))
+    with mp.workdps(DIGITS + GUARD):
+        if zeta_B == zeta_H:  # a common factor of the determinant, which leaves its zero: go around
+            zeta_B = _mpf(zeta_B) * (1 + mp.mpf(10) ** -25)
+        if chi_B == chi_H:
+            return None  # a3 = 0, and the determinant does not depend on the speed
+        one, two = determinant(1), determinant(2)
+        square = 1 - 3 * one / (two - one)
+        return mp.sqrt(square) if square >= 0 else None
 
 
 # Exact arithmetic
@@ -152,24 +151,15 @@ def exact_multiplicities(coefficients):
 
     [(1, 2), (3, 1)] is one triple root and two simple ones. Coefficients are rational; floats are exact.
     """
-    exact = [Fraction(c) for c in coefficients]
-    s = sympy.Symbol("s")
-    polynomial = sympy.Poly([sympy.Rational(c.numerator, c.denominator) for c in exact], s, domain="QQ")
-    return sorted((multiplicity, factor.degree()) for factor, multiplicity in polynomial.sqf_list()[1])
+    _, factors = rational_polynomial(coefficients).factor_squarefree()
+    return sorted((multiplicity, factor.degree()) for factor, multiplicity in factors)
 
 
 def certified_roots(coefficients):
     """Each distinct root once, with its exact multiplicity, from balls that provably isolate it (FLINT)."""
-    exact = [Fraction(c) for c in coefficients]
-    polynomial = flint.fmpq_poly([flint.fmpq(c.numerator, c.denominator) for c in reversed(exact)])
-    before = flint.ctx.dps
-    flint.ctx.dps = DIGITS + GUARD
-    try:
-        balls = polynomial.complex_roots()
-        with mp.workdps(DIGITS + GUARD):
-            return [(mp.mpc(_middle(ball.real), _middle(ball.imag)), count) for ball, count in balls]
-    finally:
-        flint.ctx.dps = before
+    with flint.ctx.workdps(DIGITS + GUARD), mp.workdps(DIGITS + GUARD):
+        balls = rational_polynomial(coefficients).complex_roots()
+        return [(mp.mpc(_middle(ball.real), _middle(ball.imag)), count) for ball, count in balls]
 
 
 def routh_exact(coefficients):
@@ -192,40 +182,22 @@ def routh_exact(coefficients):
 
 
 def discriminant_exact(coefficients):
-    """Discriminant (-1)^(n(n-1)/2) Res(p, p') / a0 by the Sylvester determinant in Fractions; degree >= 1."""
-    a = [Fraction(c) for c in coefficients]
-    n = len(a) - 1
-    slope = [c * (n - i) for i, c in enumerate(a[:-1])]
-    zero = Fraction(0)
-    rows = [[zero] * i + a + [zero] * (n - 2 - i) for i in range(n - 1)]
-    rows += [[zero] * i + slope + [zero] * (n - 1 - i) for i in range(n)]
-    resultant = _determinant_exact(rows)
-    return (-resultant if n * (n - 1) // 2 % 2 else resultant) / a[0]
-
-
-def _determinant_exact(rows):
-    rows, sign = [list(row) for row in rows], 1
-    for i in range(len(rows)):
-        pivot = next((j for j in range(i, len(rows)) if rows[j][i] != 0), None)
-        if pivot is None:
-            return Fraction(0)
-        if pivot != i:
-            rows[i], rows[pivot], sign = rows[pivot], rows[i], -sign
-        for j in range(i + 1, len(rows)):
-            ratio = rows[j][i] / rows[i][i]
-            rows[j] = [x - ratio * y for x, y in zip(rows[j], rows[i], strict=True)]
-    return sign * prod((rows[i][i] for i in range(len(rows))), start=Fraction(1))
+    """Discriminant (-1)^(n(n-1)/2) Res(p, p') / a0 by FLINT, as a Fraction; degree >= 1."""
+    found = rational_polynomial(coefficients).discriminant()
+    return Fraction(int(found.p), int(found.q))
 
 
 # Small change
 
 
+def rational_polynomial(coefficients):
+    """The polynomial in FLINT's rationals."""
+    exact = [Fraction(c) for c in reversed(coefficients)]
+    return flint.fmpq_poly([flint.fmpq(c.numerator, c.denominator) for c in exact])
+
+
 def _product(p, q):
-    total = [0] * (len(p) + len(q) - 1)
-    for i, x in enumerate(p):
-        for j, y in enumerate(q):
-            total[i + j] += x * y
-    return total
+    return np.convolve(np.array(p, dtype=object), np.array(q, dtype=object)).tolist()
 
 
 def _mpf(value):

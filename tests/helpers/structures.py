@@ -1,6 +1,9 @@
 """Factored forms of every structure of four roots, and the dimensionless design, in mpmath."""
 
-from helpers.oracles import polynomial_60
+from functools import reduce
+
+import numpy as np
+from helpers.oracles import polynomial_60, weave_Fr_60
 from mpmath import mp
 
 NATIVE = ("Fr", "mu", "chi_B", "chi_H", "zeta_B", "zeta_H", "lambda_s")
@@ -33,7 +36,7 @@ def quantities_60(p):
         **q,
         "nu_H": nu_H,
         "omega0": -mp.root(a[4] / a[0], 4) if a[4] / a[0] >= 0 else None,
-        "Fr_c": weave(q),
+        "Fr_c": weave_Fr_60(**{name: q[name] for name in NATIVE[1:]}),
         "chi_T": centre,
         "load_front": centre,
         "load_rear": 1 - centre,
@@ -54,32 +57,8 @@ def quantities_60(p):
     return found
 
 
-def weave(q):
-    """Zero in Fr² of the Hurwitz determinant over Fr², which is linear in Fr²: from its values at two speeds."""
-
-    def determinant(Fr):
-        a0, a1, a2, a3, a4 = polynomial_60(**{**q, "Fr": mp.mpf(Fr)})
-        return (a1 * a2 * a3 - a0 * a3**2 - a1**2 * a4) / Fr**2
-
-    if q["zeta_B"] == q["zeta_H"]:  # a common factor of the determinant, which leaves its zero: go around
-        return weave({**q, "zeta_B": q["zeta_B"] * (1 + mp.mpf(10) ** -25)})
-    one, two = determinant(1), determinant(2)
-    slope = (two - one) / 3
-    if q["chi_B"] == q["chi_H"]:
-        return None  # a3 = 0, and the determinant does not depend on the speed
-    square = 1 - one / slope
-    return mp.sqrt(square) if square >= 0 else None
-
-
 def times(*factors):
-    found = [mp.mpf(1)]
-    for factor in factors:
-        longer = [mp.mpf(0)] * (len(found) + len(factor) - 1)
-        for i, x in enumerate(found):
-            for j, y in enumerate(factor):
-                longer[i + j] += x * y
-        found = longer
-    return found
+    return reduce(np.convolve, [np.array(factor, dtype=object) for factor in factors], [mp.mpf(1)]).tolist()
 
 
 def pair(g, W):

@@ -73,6 +73,7 @@ def test_roots_are_eigenfrequencies(trimer):
     assert right - left > 1
 
 
+@pytest.mark.slow
 def test_a_chart_and_a_trace_speak_of_h(trimer):
     fixed, free = {"k": 1.0, "loss": 1.0, "d3": 0.0}, {"gain": (0.2, 2.0), "d1": (-1.0, 1.0)}
     edge = tmsopt.Problem(trimer.problem.model, fixed=fixed, free=free, locate="weave")

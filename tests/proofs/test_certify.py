@@ -54,12 +54,6 @@ def growth(**design):
     return hunt.abscissa({**TILTED, **design})
 
 
-def plane(count=120):
-    """Froude numbers and centres of mass all over the plane, its edges included."""
-    Fr, chi_B = np.meshgrid(np.linspace(*PLANE["Fr"], count), np.linspace(*PLANE["chi_B"], count))
-    return Fr, chi_B
-
-
 @pytest.fixture(scope="module")
 def slow_plane():
     """The least abscissa of the plane, which is an EP3 at a tilt less than that of the EP4: ω0 does not close the gap."""
@@ -121,7 +115,7 @@ def test_the_least_abscissa_of_a_plane(slow_plane, bounded_plane):
     assert slow_plane.bound.method == "omega0"
     assert not slow_plane.bound.proven
     check_closed(bounded_plane)
-    Fr, chi_B = plane()
+    Fr, chi_B = np.meshgrid(*(np.linspace(*ends, 120) for ends in PLANE.values()))
     least = growth(Fr=Fr, chi_B=chi_B).min()
     assert OMEGA0 < bounded_plane.bound.value <= least <= bounded_plane.value + 0.3
     assert replace(bounded_plane, bound=slow_plane.bound) == slow_plane
@@ -149,44 +143,41 @@ def test_a_limit_on_the_tilt():
 
 
 @pytest.mark.slow
-def test_the_slowest_stable_speed(slowest):
-    """Of the designs of a grid whose abscissa is at most −0.2, none is slower than the bound; some nearly as slow."""
-    design = prove_closed(slowest)
-    Fr, chi_B = plane()
-    least = Fr[growth(Fr=Fr, chi_B=chi_B) <= -0.2].min()
-    assert design.bound.value <= least <= design.value + 2 * (Fr[0, 1] - Fr[0, 0])
+@pytest.mark.parametrize(
+    ("fixed", "free", "limits", "goal", "off"),
+    [
+        ({}, PLANE, {"s": "abscissa <= -0.2"}, {"minimize": "Fr"}, 0.05),  # some are nearly as slow: two steps of Fr
+        (
+            {"Fr": 2.5},
+            {"chi_B": (1.01, 3.0), "lambda_s": (0.02, 1.2)},
+            {"s": "abscissa <= -0.1"},
+            {"maximize": "lambda_s"},
+            0.02,
+        ),
+        # At a corner, which the grid has. The line must have a root on it, or any line to the right would do.
+        ({"Fr": 2.5}, {"chi_B": (1.01, 3.0), "lambda_s": (0.1, 0.5)}, {}, {"maximize": "abscissa"}, 1e-9),
+        ({}, PLANE, {"v": "Fr <= 1.6"}, {"maximize": "damping_ratio"}, 0.1),  # below 1, since the speed is
+    ],
+    ids=lambda given: " ".join(given) if isinstance(given, dict) else "",
+)
+def test_no_design_of_a_grid_is_beyond_the_bound_and_some_is_nearly_the_optimum(fixed, free, limits, goal, off):
+    fixed = {n: v for n, v in {**TILTED, **fixed}.items() if n not in free}
+    design = optimum(Problem(models.tms, fixed, free, limits, **goal))
+    at = dict(zip(free, np.meshgrid(*(np.linspace(*ends, 120) for ends in free.values())), strict=True))
+    quantities = {"abscissa": hunt.abscissa, "damping_ratio": hunt.damping_ratio}
+    ((sense, expression),) = goal.items()
+    value, violation = hunt.judge(sense, expression, limits.values(), quantities)({**fixed, **at})
+    sign = design.problem.posed.sign
+    assert sign * design.bound.value <= value[violation <= 0].min() <= sign * design.value + off
 
 
 @pytest.mark.slow
-def test_the_greatest_stable_tilt():
-    """Likewise, maximised: none is above the bound."""
-    fixed = {**HEIGHTS, "Fr": 2.5}
-    free = {"chi_B": (1.01, 3.0), "lambda_s": (0.02, 1.2)}
-    asked = Problem(models.tms, fixed, free, {"s": "abscissa <= -0.1"}, maximize="lambda_s")
-    design = optimum(asked)
-    chi_B, tilt = np.meshgrid(*(np.linspace(*ends, 150) for ends in free.values()))
-    greatest = tilt[growth(Fr=2.5, chi_B=chi_B, lambda_s=tilt) <= -0.1].max()
-    assert design.value - 2 * (tilt[1, 0] - tilt[0, 0]) <= greatest <= design.bound.value
-
-
-@pytest.mark.slow
-def test_the_greatest_abscissa():
-    """Bounded from above: the line must have a root on it, or any line to the right would do."""
-    free = {"chi_B": (1.01, 3.0), "lambda_s": (0.1, 0.5)}
-    design = prove_closed(solve(Problem(models.tms, {**HEIGHTS, "Fr": 2.5}, free, maximize="abscissa")))
-    chi_B, tilt = np.meshgrid(*(np.linspace(*ends, 60) for ends in free.values()))
-    greatest = growth(Fr=2.5, chi_B=chi_B, lambda_s=tilt).max()
-    assert greatest == pytest.approx(design.value, rel=1e-9)  # at a corner, which the grid has
-    assert greatest <= design.bound.value
-
-
-@pytest.mark.slow
-def test_the_greatest_damping_ratio():
-    """Below 1, since the speed is; of a grid, none above the bound."""
-    design = optimum(problem(constraints={"v": "Fr <= 1.6"}, maximize="damping_ratio"))
-    Fr, chi_B = plane()
-    greatest = hunt.damping_ratio({**TILTED, "Fr": Fr, "chi_B": chi_B})[Fr <= 1.6].max()
-    assert design.value - 0.1 <= greatest <= design.bound.value < 1
+def test_over_a_band_of_speeds():
+    """No design is better at its worst speed, which is one of a grid or worse."""
+    asked = problem({"chi_B": (1.01, 3.0)}, minimize="abscissa", scenarios={"Fr": Band(1.5, 2.5)})
+    design = optimum(asked, starts=4)
+    Fr, chi_B = np.meshgrid(np.linspace(1.5, 2.5, 60), np.linspace(1.01, 3.0, 400))
+    assert design.bound.value <= growth(Fr=Fr, chi_B=chi_B).max(axis=1).min() <= design.value + 0.01
 
 
 def test_a_damping_ratio_is_never_above_1():
@@ -211,15 +202,6 @@ def test_the_slowest_ep4():
     free = {"zeta_H": (-0.4, -0.1), "Fr": (0.5, 6.0), "chi_B": (1.01, 3.0), "lambda_s": (0.02, 1.2)}
     design = optimum(problem(free, locate="EP4", minimize="Fr"))
     assert design.bound.value <= law(at)[1] <= design.value + 1e-9
-
-
-@pytest.mark.slow
-def test_over_a_band_of_speeds():
-    """No design is better at its worst speed, which is one of a grid or worse."""
-    asked = problem({"chi_B": (1.01, 3.0)}, minimize="abscissa", scenarios={"Fr": Band(1.5, 2.5)})
-    design = optimum(asked, starts=4)
-    Fr, chi_B = np.meshgrid(np.linspace(1.5, 2.5, 60), np.linspace(1.01, 3.0, 400))
-    assert design.bound.value <= growth(Fr=Fr, chi_B=chi_B).max(axis=1).min() <= design.value + 0.01
 
 
 def test_the_instant_bound_is_kept_where_it_proves_more():
@@ -300,16 +282,6 @@ def test_a_singular_mass_matrix_within_the_box():
     offsets = np.concatenate([s * np.geomspace(1e-9, 0.05, 60) for s in (-1, 1)])
     Fr, chi_H = np.meshgrid(np.linspace(*free["Fr"], 60), singular + offsets)
     assert design.bound.value <= growth(Fr=Fr, chi_H=chi_H, chi_B=1.3).min()
-
-
-@pytest.mark.slow
-def test_a_nearly_singular_problem():
-    """A design of the suite without a limit on ν_H; its value is kept beside it, found in many ways."""
-    kept = KEPT[48]
-    start = {n: kept.parameters[n] for n in random_problem(48).free}
-    design = certify(solve(replace(random_problem(48), start=start), starts=1, throw=False), seconds=1.0)
-    assert design.bound.value <= kept.value + 1e-9
-    assert not design.bound.proven or design.value <= kept.value + CLOSED * 0.1
 
 
 # Problems without a design, and with hardly any
@@ -418,10 +390,6 @@ def check_instant(design, solution):
     assert design.value == solution.value
     assert not design.bound.proven
     assert design.bound.value == solution.bound.value
-
-
-def test_no_process_is_left(slow_plane, children):
-    assert prove_bound(slow_plane).bound.proven
 
 
 def test_an_interrupt_keeps_the_design(slow_plane, children):
@@ -591,11 +559,10 @@ def test_command_without_scip(file):
     assert "pip install 'tmsopt[certify]'" in err
 
 
-@pytest.mark.parametrize("seconds", ["0", "-3.5", "soon"])
+@pytest.mark.parametrize("seconds", ["0", "soon"])
 def test_command_with_a_bad_time(file, seconds):
     code, _, err = run("solve", file, f"--certify={seconds}")
-    assert code == 2
-    assert ("--certify" if seconds != "-3.5" else "-3") in err  # which click takes for an option
+    assert (code, "--certify" in err) == (2, True)
 
 
 @pytest.mark.parametrize(

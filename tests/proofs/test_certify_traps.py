@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from tmsopt import Problem, certify, solve
-from tmsopt.algebra import INTERVALS, UnsupportedOperation, ball, interval
+from tmsopt.algebra import UnsupportedOperation
 from tmsopt.global_search import (
     INFEASIBLE,
     SCIP,
@@ -33,13 +33,6 @@ def question(free, constraint, base=FIXED):
 
 def verdicts(asked):
     return {SCIP.decide(make_task(asked.program(sign), 5.0)).verdict for sign in asked.possible_signs()}
-
-
-@pytest.mark.parametrize(("lower", "upper"), [(-1.5, 0.2), (-0.2, 1.5), (-1.0, 1.0), (0.0, 2.0), (-3.0, -1.0)])
-def test_a_square_over_a_range_around_0_reaches_down_to_0(lower, upper):
-    least, most = interval(INTERVALS.operations["square"](ball((lower, upper))))
-    assert least <= (0.0 if lower <= 0 <= upper else min(lower**2, upper**2))
-    assert most >= max(lower**2, upper**2)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from flint import arb, ctx, fmpq
-from helpers.oracles import ep4_of_heights
+from helpers.oracles import ep4_of_heights, polynomial_60, roots_60
 from helpers.places import PROBLEMS
+from helpers.structures import native_60
 from mpmath import atan, mp, mpf, sqrt, tan, workdps
 
 from tmsopt import InputError, Problem, load, models, prove, solve
@@ -23,7 +24,7 @@ from tmsopt.cli import command_group as main
 from tmsopt.documents import list_numbers
 from tmsopt.models import decimal
 from tmsopt.problem import Case
-from tmsopt.proofs import Factorisation, Proof, prove_design
+from tmsopt.proofs import Factorisation, prove_design
 from tmsopt.roots import exact_roots, product
 
 factored = import_module("tmsopt.proofs.factorisation")
@@ -132,6 +133,7 @@ def test_a_triple_root_and_its_derivatives():
         truth = mp.findroot(conditions, start, tol=1e-110)
         found = proof.parameters["Fr"], proof.parameters["chi_B"], proof.unknowns["r"]
         assert all(holds(value, exact) for value, exact in zip(found, truth, strict=True))
+    assert solved("heavily_damped").value == pytest.approx(float(truth[0]), abs=1e-11)
     assert proof.pattern == "EP3"
     assert [z.multiplicity for z in proof.roots] == [3, 1]
     assert proof.held["lambda_s"] == str(Fraction(repr(math.radians(10))))  # a double in radians, as its decimal
@@ -161,30 +163,6 @@ def test_the_printed_region_and_error_are_proved():
     error, region = (float(re.search(rf"{words} (\S+)", text)[1]) for words in ("error at most", "by more than"))
     assert proof.radius <= error < 1.2 * proof.radius
     assert 0.9 * proof.uniqueness < region <= proof.uniqueness
-
-
-def test_uniqueness_ends_before_the_other_solution():
-    """At Fr = 2.25 the EP set is met at two tilts, the roots of a quadratic; each is proved, unique up to the other."""
-    problem = bicycle("2EP2", {"Fr": 2.25}, {"chi_B": (1.01, 3), "lambda_s": (0.02, 1.4)})
-    r, h = SQRT2, SQRT2 / 5
-    square = 2.25**2 * (r - 1)
-    tilts = np.roots([4 * (r + 1) ** 2 * h, -square * 4 * h * (r + 1), square * r * (r - 1)])
-    proofs = []
-    for T, kind in zip(sorted(tilts), ("2EP2", "CEP2"), strict=True):
-        design = {**problem.fixed, "chi_B": r, "lambda_s": math.atan(T)}
-        proof = prove_design(replace(problem, locate=kind).posed, polished(design), kind)
-        assert proof.proved, proof.reason
-        assert float(proof.tangents["lambda_s"]) == pytest.approx(T, abs=1e-12)
-        proofs.append(proof)
-    apart = abs(tilts[0] - tilts[1])
-    assert all(0 < p.uniqueness < apart for p in proofs)
-
-
-def polished(design):
-    """The same with tan λ_s on the EP set to the last digit: numpy's roots near a fold lose a few."""
-    with workdps(30):
-        T = mp.findroot(lambda x: ep_set(x) - mpf(repr(design["Fr"])) ** 2, tan(design["lambda_s"]))
-        return {**design, "lambda_s": float(atan(T))}
 
 
 def test_the_critical_speed():
@@ -241,17 +219,14 @@ def test_patterns_of_optima(name, pattern):
 
 
 def test_a_design_without_multiple_roots_is_taken_as_it_is():
-    """Nothing is solved for: its roots are isolated; beside them those of mpmath at 50 digits."""
+    """Nothing is solved for: its roots are isolated; beside them those of mpmath at 60 digits."""
     design = solved("benchmark")
     proof = prove(design)
     assert (proof.proved, proof.pattern, proof.moved, proof.method) == (True, "pair", (), "isolated roots")
     with workdps(60):
         p = {n: mpf(v.value) for n, v in proof.parameters.items()} | {"lambda_s": mp.radians(5)}  # as typed
-        native = {"Fr": p["v"] / sqrt(p["g"] * p["w"]), "mu": p["m_H"] / p["m_B"]}
-        native |= {f"chi_{k}": p[f"x_{k}"] / p["w"] for k in "BH"} | {f"zeta_{k}": p[f"z_{k}"] / p["w"] for k in "BH"}
-        a = models.tms.polynomial(**native, T=tan(p["lambda_s"]))
-        roots = sorted(mp.polyroots(a, maxsteps=200, extraprec=400), key=lambda z: (-z.real, -z.imag))
-        for found, truth in zip(proof.roots, roots, strict=True):
+        roots = roots_60(polynomial_60(**native_60(p)))
+        for found, truth in zip(proof.roots, sorted(roots, key=lambda z: (-z.real, -z.imag)), strict=True):
             assert holds(found.re, truth.real)
             assert holds(found.im, truth.imag)
     assert proof.stable.holds is True
@@ -355,7 +330,7 @@ def test_digits_that_are_not_accepted(digits):
 
 @pytest.mark.parametrize(
     ("name", "digits"),
-    [(n, d) for n in ("ep4", "optimised_benchmark", "heavily_damped") for d in (3, 6, 9)]
+    [(n, d) for n in ("ep4", "optimised_benchmark", "heavily_damped") for d in (3, 9)]
     + [("ep4", 12), ("heavily_damped", 12)],
 )
 def test_a_rounded_design_is_refused(name, digits):
@@ -399,7 +374,7 @@ def test_parameters_that_do_not_suffice(free, words):
     check_refused(prove_design(problem.posed, design, "EP4"), *words)
 
 
-@pytest.mark.parametrize("rate", [1e-9, 1e6, 1e12])
+@pytest.mark.parametrize("rate", [1e-9, 1e12])
 @pytest.mark.parametrize("carrier", [0.0, 1e6])
 def test_an_EP2_of_H_in_any_unit_and_frame(rate, carrier):
     """|g1 − g2|/2 = k and d = 0, whatever the unit of rates; a carrier costs its own digits of double precision."""
@@ -584,7 +559,6 @@ def test_a_proof_is_plain_data():
     data = json.loads(json.dumps(proof.to_json(), allow_nan=False))
     assert data["parameters"]["chi_B"]["value"].startswith("1.414213562373095048801688724209698")
     assert data["proved"] is True
-    assert isinstance(Proof("nothing", False), Proof)
 
 
 def test_a_band_is_proved_in_its_worst_case():

@@ -133,12 +133,14 @@ OPEN = [
 ]
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize(("coefficients", "asked", "best"), OPEN)
-@pytest.mark.slow
-def test_there_is_no_best_design_where_a_root_goes_to_infinity(coefficients, asked, best, sign):
+@pytest.mark.parametrize(
+    ("number", "sign"), [(0, 1), *(pytest.param(k, (-1) ** k, marks=pytest.mark.slow) for k in range(1, len(OPEN)))]
+)
+def test_there_is_no_best_design_where_a_root_goes_to_infinity(number, sign):
+    coefficients, asked, best = OPEN[number]
     design = tmsopt.solve(problem([sign * c for c in coefficients], **asked), throw=False)
     assert design.status == "not_converged"
+    assert "no best design exists" in str(design)
     assert any(
         note.startswith("no best design: the objective improves towards a singular mass matrix")
         for note in design.notes
@@ -166,11 +168,9 @@ def test_a_limit_makes_it_an_optimum(coefficients, asked, best):
     ("coefficients", "free"),
     [
         ([x, 1], {"x": (-1.0, 1.0)}),
-        ([x, 1], {"x": (0.0, 1.0)}),
         (product([x, 1], [x, 2]), {"x": (0.0, 1.0)}),
         ([x, 1 + y], {"x": (-1.0, 1.0), "y": (0.0, 1.0)}),
     ],
-    ids=["both signs", "one sign", "two roots", "two parameters"],
 )
 def test_an_abscissa_without_a_lower_bound_is_said_to_have_none(coefficients, free):
     """It is −1/x, or −(1 + y)/x: below anything as x goes to 0 from above."""
@@ -282,19 +282,7 @@ def test_a_value_that_hangs_on_rounding_is_no_optimum(monkeypatch, off, status):
     assert tmsopt.solve(PLAIN, throw=False).status == status
 
 
-def demote(state, found):
-    return replace(found, status="not_converged")
-
-
-@pytest.mark.parametrize(
-    ("place", "said"),
-    [
-        ("outcome.is_unclear", lambda problem, checked: True),
-        ("search.demote_if_unbounded", demote),
-        ("search.demote_if_beaten", demote),
-    ],
-)
-def test_every_optimum_is_asked(monkeypatch, place, said):
+def test_every_optimum_is_asked(monkeypatch):
     assert tmsopt.solve(PLAIN, throw=False).status == "optimal"
-    monkeypatch.setattr(f"tmsopt.search.{place}", said)
+    monkeypatch.setattr("tmsopt.search.outcome.is_unclear", lambda problem, checked: True)
     assert tmsopt.solve(PLAIN, throw=False).status == "not_converged"

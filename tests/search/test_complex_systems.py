@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -141,21 +140,11 @@ def test_heavy_damping_of_the_polynomial_is_no_boundary():
     assert not tmsopt.nearest(tmsopt.solve("problems/ring_backscattering.toml"), "heavy damping").found
 
 
-def test_a_carrier_of_a_million_couplings():
-    """No false exceptional point is found: it is where it is without the carrier, to the roundings of that."""
-    model = from_hamiltonian([["w1 - 1j*g1", "k"], ["k", "w - 1j*g2"]])
-    free = {"w1": (1e6 - 1, 1e6 + 1), "k": (0.01, 1)}
-    found = tmsopt.solve(tmsopt.Problem(model, fixed={"w": 1e6, "g1": 0.3, "g2": 0.1}, free=free, locate="EP2"))
-    assert found.parameters["k"] == pytest.approx(0.1, abs=EXACT)
-    assert found.parameters["w1"] == pytest.approx(1e6, abs=1.2e-10)
-    assert tmsopt.prove(found).proved
-
-
 def test_the_optimum_of_a_lossy_dimer_is_its_trace():
     """No eigenfrequency decays faster than the mean loss, which all reach beyond the exceptional point."""
     found = tmsopt.solve(dimer({"k": (0.1, 2)}, minimize="abscissa"))
     assert found.abscissa == pytest.approx(-0.6, abs=EXACT)
-    assert found.bound.proven
+    assert (found.status, found.bound.proven) == ("optimal", True)
 
 
 @pytest.mark.parametrize("size", [1, 2, 3])
@@ -188,16 +177,8 @@ def test_json_has_eigenfrequencies_beside_roots():
     assert "eigenfrequencies" not in tmsopt.solve("problems/coupled_pair.toml").to_json()
 
 
-def test_studies_keep_to_the_matrix():
-    """A row for each g2; the exceptional point follows it."""
-    problem = tmsopt.load("problems/loss_only_dimer.toml")
-    rows = tmsopt.run_study(tmsopt.Study(problem, {"g2": [0.2, 0.4, 0.6]})).rows
-    assert [row.structure for row in rows] == ["EP2"] * 3
-    assert [row.parameters["k"] for row in rows] == pytest.approx([0.4, 0.3, 0.2], abs=EXACT)
-
-
-def test_charts_and_pages_take_a_complex_system():
-    """Stable beside unstable where the gain passes the loss; roots of the page are told as eigenfrequencies."""
+def test_charts_take_a_complex_system():
+    """Stable beside unstable where the gain passes the loss."""
     plane = laser({"g": (0.1, 1.5), "l": (0.1, 1.5)}, k=1.0)
     chart = tmsopt.chart(replace(plane, locate=None), ("g", "l"), points=(40, 40), boundaries=False)
     gain, loss = np.meshgrid(*chart.grid)
@@ -205,8 +186,6 @@ def test_charts_and_pages_take_a_complex_system():
     assert set(np.unique(names)) == {"stable", "weave"}
     off = np.minimum(np.abs(gain - loss), np.abs(gain * loss - 1)) > 1e-9
     assert np.array_equal((names == "stable")[off], ((gain < loss) & (gain * loss < 1))[off])
-    page = tmsopt.explore("problems/loss_only_dimer.toml").html
-    assert "both eigenfrequencies coincide (EP2)" in page
 
 
 def test_the_threshold_is_the_edge_and_says_which_eigenfrequency_is_real():
@@ -267,6 +246,7 @@ def test_a_parameter_at_zero_is_changed_absolutely_and_shifts_hold():
     assert "nowhere sampled" not in text
 
 
+@pytest.mark.slow
 def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met():
     """The EP3 of the trimer at g = l = √2, d = 0: what is printed near it is right to half a unit of its last digit."""
     model = from_hamiltonian([["d + 1j*g", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j*l"]])
@@ -279,10 +259,6 @@ def test_digits_of_a_curve_through_an_EP3_are_no_more_than_are_met():
             value = float(str(row[1]))
             if abs(value - math.sqrt(2)) < 1e-3 and "g" in row[-1].split(", "):
                 assert abs(value - math.sqrt(2)) <= 0.5 * 10.0 ** -len(str(row[1]).split(".")[1])
-    branch, event = next((b, e) for b in traced.branches for e in b.events if e in near)
-    met = replace(event, parameters={**event.parameters, "g": math.sqrt(2) + 3.8e-10}, residual=6e-11)
-    cells = list_events(replace(branch, events=(met,)), {"g": tmsopt.problem.Unit()}, model)[1]
-    assert str(cells[1]) == "1.4142136"  # two digits fewer than met
 
 
 @pytest.mark.slow
@@ -292,16 +268,6 @@ def test_no_damping_ratio_is_told_of_the_cases_of_a_matrix():
     report = str(tmsopt.solve(asked))
     assert "worst case" in report
     assert "damping ratio" not in report
-
-
-def test_words_of_a_matrix_with_gain():
-    model = from_hamiltonian([["1j", "k", "0"], ["k", "0", "k"], ["0", "k", "-1j"]])
-    told, chart = import_module("tmsopt.models.user_spectrum"), import_module("tmsopt.plots.chart")
-    lossy, gaining = (told.describe_user_structure(model, "EP2", gain) for gain in (False, True))
-    assert lossy == "the two least damped eigenfrequencies coincide (EP2)"
-    assert gaining == "the two eigenfrequencies of most gain coincide (EP2)"
-    (patch,) = chart.class_handles(np.array([chart.CLASSES.index("weave")], dtype=np.int8), model)
-    assert patch.get_label() == "gain, beyond threshold"
 
 
 # Crossings that keep their eigenvectors are no exceptional points
@@ -336,7 +302,7 @@ def test_the_search_goes_on_for_a_defective_one():
 
 
 def test_all_designs_count_crossings_apart():
-    every = tmsopt.solve_all(tmsopt.Problem(DIABOLIC, free=BOX, locate="EP2"), seconds=0)
+    every = tmsopt.solve_all(tmsopt.Problem(DIABOLIC, free=BOX, locate="EP2"), seconds=0, starts=8)
     assert not every.solutions
     assert every.coverage is not None
     assert every.coverage.crossings == every.coverage.starts
@@ -374,13 +340,3 @@ def test_coefficients_cannot_tell():
     found = tmsopt.solve(tmsopt.Problem(swing, free={"c": (0.0, 3.0)}, locate="EP2"))
     assert found.to_json()["defective"] is None
     assert "coefficients cannot tell" in str(found)
-
-
-def test_an_optimum_at_a_singular_mass_matrix_is_none():
-    """(m s + 1)(s + 2 − m): the abscissa m − 2 is least at m = 0, where a root is at infinity."""
-    model = from_coefficients(["m", "1 + m*(2 - m)", "2 - m"])
-    found = tmsopt.solve(tmsopt.Problem(model, free={"m": (0.0, 0.4)}, minimize="abscissa"), throw=False)
-    assert found.status == "not_converged"
-    assert "no best design exists" in str(found)
-    held = tmsopt.solve(tmsopt.Problem(model, free={"m": (0.01, 0.4)}, minimize="abscissa"))
-    assert held.abscissa == pytest.approx(-1.99, abs=1e-8)

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from importlib import import_module
 
 import casadi as ca
 import numpy as np
@@ -15,8 +14,6 @@ from tmsopt.models import from_coefficients
 from tmsopt.problem import Problem, load, replace_limit
 from tmsopt.program import forget_solvers, formulate
 from tmsopt.search import solve
-
-nlp = import_module("tmsopt.program.nlp")
 
 EP4 = skate({"Fr": (0.01, 10), "chi_B": (1.01, 5), "lambda_s": (0.02, 1.4)}, minimize="abscissa")
 
@@ -87,14 +84,6 @@ def test_a_design_nearby_decides_on_the_side(sign):
     found = solve(problem, near=there, starts=8, throw=False)
     assert sign * found.parameters["lambda_s"] >= 0  # reversed rake has no stable design: 0 is its best
     assert len(found.sides) == 1
-
-
-def test_nothing_grows_without_end():
-    """Each box of a pattern without an objective makes another program."""
-    problem = replace(EP4, minimize=None, locate="EP3")
-    for k in range(80):
-        assert formulate(replace(problem, free={**problem.free, "Fr": (0.01, 10.0 + k)}).posed).program
-    assert nlp._PROGRAMS.get.cache_info().currsize == nlp._PROGRAMS.get.cache_info().maxsize == 64
 
 
 def test_a_number_is_a_parameter_unless_it_is_nothing():

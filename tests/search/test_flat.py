@@ -63,12 +63,3 @@ def test_a_limit_that_is_flat_elsewhere_has_its_price():
     """Of x² ≤ 1e-4 the price is that of x over 2 x: 50."""
     design = tmsopt.solve(bicycle("(Fr - 1.7)**2 <= 1e-4", maximize="Fr"))
     assert (design.value, design.active["limit0"]) == (pytest.approx(1.71, abs=1e-9), pytest.approx(50))
-
-
-def test_a_flat_stretch_at_the_bound_is_optimal():
-    """Two modes beyond their EP at k = 0.4 share the loss (g1 + g2)/2 whatever k is, and no design does better."""
-    pair = tmsopt.models.from_hamiltonian([["-1j", "k"], ["k", "-0.2j"]])
-    design = tmsopt.solve(tmsopt.Problem(pair, free={"k": (0.1, 0.5)}, minimize="abscissa"))
-    assert design.status == "optimal"
-    assert design.bound.proven
-    assert design.abscissa == pytest.approx(-0.6, abs=1e-12)

@@ -69,7 +69,6 @@ def test_the_oscillator_in_closed_form(objective, constraints, optimum):
         (TWO, (0.9, 1.9), "minimize", "angular_frequency", "c >= 0.2", math.sqrt(4 - 1.9**2)),  # of the second pair
         (TWO, (0.9, 3.0), "minimize", "angular_frequency", "c >= 0.2", math.sqrt(1 - 0.9**2)),  # of the first
         (TWO, (3.0, 3.0), "minimize", "z + c", "angular_frequency <= 0.5", math.sqrt(0.75) + math.sqrt(3.75)),
-        (TWO, (3.0, 3.0), "minimize", "z + c", "angular_frequency <= 0", 3.0),  # two double roots, −1 and −2
         (TWO, (3.0, 3.0), "maximize", "z + c/2", "angular_frequency >= 0.5", 3 + math.sqrt(3.75) / 2),
     ],
 )
@@ -163,10 +162,9 @@ def frequency(design):
     [
         ("minimize", "frequency", SLOW),
         ("maximize", "decay_rate", {"f": "frequency <= 0.24"}),
-        ("minimize", "v", {"f": "frequency <= 0.3", "d": "decay_rate >= 0.5"}),
         ("maximize", "frequency", {"d": "decay_rate >= 0.5"}),
     ],
-    ids=["least", "limited", "with a decay", "greatest"],
+    ids=["least", "limited", "greatest"],
 )
 def test_no_search_finds_a_better_skate(sense, expression, limits):
     design = tmsopt.solve(asked(constraints=limits, **{sense: expression}))
@@ -198,14 +196,6 @@ def test_a_frequency_of_0_is_the_least_there_is():
     design = tmsopt.certify(tmsopt.Problem(OSCILLATOR, free={"z": (0.05, 3.0)}, minimize="angular_frequency"))
     assert design.bound.proven
     assert (design.value, design.bound.value) == (0, 0)
-
-
-def test_a_chart_has_it():
-    plane = asked({n: BOX[n] for n in ("v", "x_B")}, {"lambda_s": 0.2}, constraints=SLOW)
-    chart = tmsopt.chart(plane, points=[7, 5], quantities={"f": "frequency"})
-    v, x_B = np.meshgrid(np.linspace(*BOX["v"], 7), np.linspace(*BOX["x_B"], 5))
-    own = frequency({"v": v, "x_B": x_B, "lambda_s": 0.2})
-    assert chart.quantities["f"] == pytest.approx(own, abs=TOLERANCE)
 
 
 def test_an_equality_is_met_and_neither_proved_nor_counted():

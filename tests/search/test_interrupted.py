@@ -146,16 +146,3 @@ def test_a_second_one_ends_that_too(monkeypatch):
 def test_verbs_that_solve_on_the_way_are_ended_whole(verb):
     with pytest.raises(KeyboardInterrupt):
         verb(tmsopt.load("problems/ep4.toml"))
-
-
-@pytest.mark.parametrize(
-    ("limit", "status", "what", "least"),
-    [("x <= 2", "optimal", "searching", {0, 1}), ("x >= 10", "infeasible", "change of limits", {1})],
-)
-def test_long_work_tells_how_far_it_is(limit, status, what, least):
-    """Starts of a search, and those of a relaxation."""
-    told = []
-    assert tmsopt.solve(problem(limit), throw=False, progress=told.append).status == status
-    passed = [t for t in told if what in t.what]
-    assert least <= {t.done for t in passed}
-    assert all(t.done <= t.most for t in passed if t.done)

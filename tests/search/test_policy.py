@@ -3,7 +3,7 @@
 What is minimised are two wells, the left one deeper (helpers/wells.py).
 """
 
-from dataclasses import FrozenInstanceError, fields, replace
+from dataclasses import fields, replace
 from importlib import import_module
 from types import SimpleNamespace
 
@@ -15,7 +15,7 @@ import tmsopt
 from benchmarks.suites import hard_problem
 from tmsopt.errors import InputError
 from tmsopt.models import from_coefficients
-from tmsopt.problem import expected_unseen, expects_few_better
+from tmsopt.problem import expected_unseen
 from tmsopt.search import SearchState, make_failed_end
 
 accepting, driver, sampling, states = (
@@ -54,14 +54,6 @@ def test_starts_begin_with_those_at_hand_then_take_turns():
     assert [start.row for start in starts[2:4]] == [0, len(state.sample.refined)]
 
 
-@pytest.mark.parametrize(("at", "well"), [(-1.3, LEFT), (0.7, RIGHT), (1.9, RIGHT)])
-def test_a_start_ends_in_its_well(at, well):
-    (end,) = end_at(at)
-    assert end.feasible
-    assert begun().design_at(end)["x"] == pytest.approx(well, abs=1e-6)
-    assert end.objective == pytest.approx(depth(well), abs=1e-10)
-
-
 def test_the_best_end_is_accepted_whatever_their_order():
     ends = end_at(0.7, -1.3, 0.9)
     accepted = POLICY.accept(replace(begun(), ends=ends))
@@ -93,14 +85,6 @@ def test_an_end_off_the_rows_is_no_optimum(violation, slope, ended):
 
 
 # When a search ends: by the optima that are expected still, from how many starts ended in how many different ones
-
-
-def test_one_end_is_not_enough():
-    state = begun(sampled=True)
-    (end,) = end_at(-1.3, state=state)
-    assert not POLICY.enough(replace(state, ends=(end,)))
-    many = replace(state, ends=(replace(end, led=frozenset(range(len(state.sample.leaders)))),) * 8)
-    assert POLICY.enough(many)
 
 
 PLAIN = tmsopt.Problem(from_coefficients([1, 2 + x]), free={"x": (0.0, 1.0)}, minimize="x").posed
@@ -173,11 +157,6 @@ def test_the_words_follow_from_the_numbers(tried, at_best, counts, words):
     assert tmsopt.Starts(tried, tried, at_best, **counts).sureness == words
 
 
-def test_few_starts_tell_nothing_of_better_ones():
-    assert not expects_few_better(4, 1)
-    assert tmsopt.Starts(3, 3, 3, optima=1).expected_unseen == float("inf")
-
-
 # The loop
 
 
@@ -198,17 +177,6 @@ def test_a_stage_of_ones_own_is_called_with_the_state():
     assert design.value == pytest.approx(depth(LEFT), abs=1e-8)  # the first start is the best of the sample
 
 
-def test_a_policy_cannot_make_a_design_look_better_than_it_is():
-    """Stages that lie are found out by the recheck."""
-
-    def flattered(state, start):
-        return replace(POLICY.local(state, start), objective=-1e3)
-
-    design = solve(wells(), policy=replace(POLICY, local=flattered), throw=False)
-    assert design.value >= depth(LEFT) - 1e-12
-    assert design.value == pytest.approx(depth(design.parameters["x"]), abs=1e-12)
-
-
 @pytest.mark.parametrize("rescued", [False, True])
 @pytest.mark.parametrize("praised", [5.0, 1.5])
 def test_what_another_stage_accepts_is_rechecked_inside_the_box(praised, rescued):
@@ -226,14 +194,6 @@ def test_what_another_stage_accepts_is_rechecked_inside_the_box(praised, rescued
     assert design.parameters["x"] <= 2.0
     assert design.value == pytest.approx(depth(design.parameters["x"]), abs=1e-12)
     assert bool(design.violations) == (design.parameters["x"] > 0)
-
-
-def test_a_search_that_ends_early_is_not_sure():
-    hasty = solve(wells(), policy=replace(POLICY, enough=lambda state: True)).starts
-    assert (hasty.runs, hasty.sureness[-1]) == (1, "a better design is possible")
-    whole = solve(wells()).starts
-    assert whole.runs >= whole.optima + 2
-    assert len(whole.sureness) == 1
 
 
 @pytest.mark.parametrize(
@@ -325,8 +285,9 @@ def test_what_one_stage_draws_changes_no_other():
     refine, again, around = (sampling.stream(0, stage).random(4) for stage in ("refine", "refine", "around"))
     assert np.array_equal(refine, again)
     assert not np.array_equal(refine, around)
-    before, after = POLICY.sample(begun()), POLICY.sample(begun())
-    assert np.array_equal(before.refined.u, after.refined.u)
+    first, again, other = (sampling.sample_box(wells().posed, seed) for seed in (5, 5, 6))
+    assert np.array_equal(first.refined.u, again.refined.u)
+    assert not np.array_equal(first.refined.u, other.refined.u)
 
 
 @pytest.mark.slow
@@ -338,12 +299,6 @@ def test_one_bold_design_is_enough_to_approach_a_singular_mass_matrix():
 
 
 # Records and numbers
-
-
-def test_nothing_of_a_search_can_be_changed():
-    for record in (POLICY, tmsopt.TUNING, begun(), Start({})):
-        with pytest.raises(FrozenInstanceError):
-            setattr(record, fields(record)[0].name, None)
 
 
 def test_every_number_has_a_unit_a_reason_and_a_benchmark():

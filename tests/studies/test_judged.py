@@ -28,13 +28,13 @@ def built(rows, share=1.0, **more):
 
 def whipple():
     design = solve(PROBLEMS / "whipple_ep4.toml")
-    return monte_carlo(design, 40, 2, tolerances={n: abs(x) / 100 for n, x in design.parameters.items() if x})
+    return monte_carlo(design, 20, 2, tolerances={n: abs(x) / 100 for n, x in design.parameters.items() if x})
 
 
 def limited():
     problem = solve(PROBLEMS / "realistic.toml").problem
     design = solve(problem)
-    return monte_carlo(design, 60, 3, tolerances={n: abs(x) / 500 for n, x in design.parameters.items() if x})
+    return monte_carlo(design, 30, 3, tolerances={n: abs(x) / 500 for n, x in design.parameters.items() if x})
 
 
 def own(limits=None, **asked):
@@ -55,8 +55,8 @@ def constant():
 
 
 STUDIES = {
-    "EP4 as built": lambda: built(60),
-    "very near EP4": lambda: built(40, 1e-6),
+    "EP4 as built": lambda: built(30),
+    "very near EP4": lambda: built(20, 1e-6),
     "wheels": whipple,
     "limits": limited,
     "constants": constant,
@@ -132,11 +132,6 @@ def test_a_store_gives_back_the_same_rows(tmp_path):
     with open_store(path, study) as store:
         assert numbers_in(store) == list(range(60))
         assert sum(session["rows"] for session in store.sessions()) == 60
-        store.forget([3, 4])
-        store.add(batch_rows([kept.rows[4]]))
-    part = run_study(study, path)
-    assert (part.found, part.solved) == (59, 1)
-    assert_same(part.rows, plain.rows)
     with pytest.raises(InputError, match="another study"):
         run_study(replace(study, seed=5), path)
 
@@ -175,11 +170,8 @@ def drawn(tmp_path_factory):
     [
         ({"rows": 30}, "columns.Fr: 20 values in the store, 30 in the file"),
         ({"seed": 2}, "seed: 1 in the store, 2 in the file"),
-        ({"distribution": "uniform"}, "columns.Fr: 20 of 20 values differ"),
         ({"tolerances": SPREAD | {"Fr": 0.03}}, "columns.Fr: 20 of 20 values differ"),
-        ({"report": ["nu_H"]}, "report: [] in the store"),
         ({"problem": replace(DRAWN.problem, fixed={**DRAWN.problem.fixed, "mu": 0.2})}, "problem.fixed.mu: 0.1"),
-        ({"problem": replace(DRAWN.problem, constraints={"slow": "Fr <= 3"})}, "problem.constraints.slow: none"),
     ],
     ids=lambda given: next(iter(given)) if isinstance(given, dict) else "is",
 )

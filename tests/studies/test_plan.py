@@ -77,14 +77,6 @@ def test_latin_hypercube_has_one_row_in_every_part_of_every_range():
     assert sample == latin_hypercube(ranges, rows, seed=3) != latin_hypercube(ranges, rows, seed=4)
 
 
-def test_sobol_is_a_net():
-    """A (0, 6, 2)-net in base 2: one point of 64 in every box of 2^-a by 2^-(6-a) (Sobol 1967; Owen 1995, scrambled)."""
-    sample = sobol({"a": (0, 1), "b": (0, 1)}, 64, seed=1)
-    for a in range(7):
-        cells = zip(np.asarray(sample["a"]) * 2**a // 1, np.asarray(sample["b"]) * 2 ** (6 - a) // 1, strict=True)
-        assert len(set(cells)) == 64
-
-
 def test_sobol_rows_begin_the_longer_sample_and_say_what_they_lack():
     sample, longer = (sobol({"a": (0, 1), "b": (2, 3)}, rows, seed=1) for rows in (100, 128))  # warnings are errors
     for name, column in sample.items():
@@ -200,13 +192,8 @@ def test_other_rows_follow_a_hilbert_curve(axes):
     assert (set(changed), largest) == ({1}, 1)
 
 
-def test_blocks_of_rows_that_are_all_alike_or_many():
+def test_blocks_of_rows_that_are_all_alike():
     assert split_into_blocks(Study(PROBLEM, {"mu": [0.1] * 5}), 2) == [(0, 1), (2, 3), (4,)]
-    study = Study(PROBLEM, sobol(dict.fromkeys(("mu", "chi_H", "Fr.min"), (0.1, 1)), 2**15, seed=1))
-    order = np.concatenate(split_into_blocks(study))
-    assert np.array_equal(np.sort(order), np.arange(2**15))
-    walk = np.diff(np.array([np.asarray(c) for c in study.columns.values()])[:, order] / 0.9, axis=1)
-    assert np.linalg.norm(walk, axis=0).mean() < 1.5 * 2**-5  # a cube for every row has sides of 2^-5
 
 
 # Definitions
@@ -262,8 +249,7 @@ def test_column_cannot_be_changed():
     for one in (column, pickle.loads(pickle.dumps(column))):
         with pytest.raises(ValueError, match="read-only"):
             np.asarray(one)[0] = 3
-    assert (list(column), column[-1], len(column[1:]), 2.5 in column) == ([1.0, 2.5], 2.5, 1, True)
-    assert (column == Column([1, 2.5]), column == Column([1, 2]), hash(column)) == (True, False, hash(Column([1, 2.5])))
+    assert (list(column), column[-1], len(column[1:])) == ([1.0, 2.5], 2.5, 1)
 
 
 # Faults of a study
@@ -272,8 +258,6 @@ def test_column_cannot_be_changed():
 @pytest.mark.parametrize(
     ("columns", "words"),
     [
-        ({"mu": [0.1], "zeta_h": [1.0]}, "zeta_h; did you mean 'zeta_H'; lambda_s.max"),
-        ({"Fr": [1.0]}, "Fr is free; fix it, or vary Fr.min or Fr.max"),
         ({"mu.max": [1.0]}, "mu is fixed; vary mu itself"),
         ({"arms.limit": [1.0]}, "did you mean 'arm.limit'"),
         ({"layout.limit": [1.0]}, "chi_B >= chi_H; number alone on one side"),
@@ -296,12 +280,8 @@ def test_faults_of_columns(columns, words):
     ("options", "words"),
     [
         ({"seed": -1}, "-1; 0 or more"),
-        ({"starts": 0}, "starts; from 1 to"),
-        ({"warm": 1}, "warm; true or false"),
         ({"report": "nu_H"}, "'nu_H'; a list, such as"),
-        ({"report": ["nuh"]}, "nuh; did you mean 'nu_H'"),
         ({"report": ["nu_H >= 1"]}, "is a comparison"),
-        ({"method": "grdi"}, "did you mean 'grid'"),
         ({"grid_shape": {"mu": 3}}, "'mu': 3} for 2 rows"),
         ({"grid_shape": {"chi_H": 2}}, "chi_H; each column; (mu)"),
         (
@@ -321,11 +301,6 @@ def test_faults_of_a_study(options, words):
 def assert_faults(words, call, *given, **options):
     text = faults(call, *given, **options)
     assert all(word in text for word in words.split("; ")), text
-
-
-def test_all_faults_of_a_study_at_once():
-    text = faults(Study, PROBLEM, {"Fr": [1.0], "mu": [math.nan]}, seed=-1, starts=0, report=["nuh"])
-    assert len(text.splitlines()) == 5
 
 
 @pytest.mark.parametrize(
@@ -449,7 +424,7 @@ grid  | seed = 3 => rows = 3                       | 5  | rows does not go with 
 grid  | seed = 3 => csv = "r.csv"                  | 5  | accepted for csv
 grid  | # end => [tolerances]\nmu = 0.01           | 15 | monte_carlo
 grid  | zeta_H => zeta_h                           | 12 | zeta_h; did you mean 'zeta_H'
-grid  | zeta_H => Fr                               | 12 | Fr is free; Fr.min
+grid  | zeta_H => Fr                               | 12 | Fr is free; fix it, or vary Fr.min or Fr.max
 grid  | points = 5, =>                             | 11 | missing points of mu; points = 10
 grid  | points = 5 => points = 1                   | 11 | 1; from 2
 grid  | points = 5 => point = 5                    | 11 | point; did you mean 'points'

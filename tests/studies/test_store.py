@@ -10,7 +10,6 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
-import time
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -96,36 +95,6 @@ def writer(path, task="write"):
         process.stdout.read()
         process.wait()
         process.stdout.close()
-
-
-@pytest.mark.slow
-def test_no_acknowledged_row_is_lost_by_kill_9(path):
-    """The process prints how many rows `add` has acknowledged; whatever it printed must be there, row by row."""
-    chance, acknowledged = random.Random(0), 0
-    for _ in range(4):
-        with writer(path) as (process, _):
-            time.sleep(chance.uniform(0, 0.05))
-            process.kill()
-            printed = process.stdout.read().split("\n")[:-1]  # the last line may be cut off
-        acknowledged = int(printed[-1]) if printed else acknowledged
-        with view_store(path) as opened:
-            done = numbers_in(opened)
-            assert len(done) >= acknowledged
-            assert done == list(range(len(done)))  # batches are kept as a whole or not at all
-            assert [s["ended"] for s in opened.sessions()] == [None] * len(opened.sessions())
-            assert sum(s["rows"] for s in opened.sessions()) == len(done)
-    assert rows_of(path) == [row(number) for number in range(len(done))]
-    assert acknowledged > 0
-
-
-@pytest.mark.slow
-def test_reading_while_another_process_writes(path):
-    with writer(path) as (process, _):
-        for _ in range(5):
-            acknowledged = int(process.stdout.readline())
-            with view_store(path) as opened:
-                there = len(numbers_in(opened))
-                assert len(RowTable(STUDY, opened.read_batches())) >= there >= acknowledged
 
 
 def test_a_second_writer_is_refused_until_the_first_is_gone(path):
