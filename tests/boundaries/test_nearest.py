@@ -425,3 +425,10 @@ def test_an_undamped_oscillator_without_stiffness_has_both_roots_at_0():
     """s² = 0: the scale of the roots underflows when their product does, as at 5e-324."""
     assert abs(roots([1.0, 5e-324, 0.0])).max() <= 1e-160
     assert robustness(oscillator(1.0, 0.0, 0.0)).edges == ("capsize",)
+
+
+def test_where_a_root_only_touches_the_axis_a_farther_edge_is_found():
+    """ω = −i g/2 ± √(k² − g²/4) is real at k = 0, but decays on both sides of it; g < 0 is gain."""
+    dimer = tmsopt.Problem(tmsopt.models.from_hamiltonian([["-1j*g", "k"], ["k", 0]]), fixed={"g": 2.0, "k": 1.0})
+    assert tmsopt.robustness(dimer).radius == pytest.approx(1, abs=1e-9)
+    assert tmsopt.robustness(dimer).weave.parameters["g"] == pytest.approx(0, abs=1e-9)
