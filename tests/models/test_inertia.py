@@ -51,18 +51,8 @@ def test_margin_is_the_least_of_several_crossings():
     rng = np.random.default_rng(0)
     margins = []
     while len(margins) < 40:
-        p = {
-            "w": 1.0,
-            "v": rng.uniform(1, 12),
-            "g": 9.81,
-            "lambda_s": rng.uniform(-1, 1),
-            "m_B": 10.0,
-            "x_B": rng.uniform(0.2, 2),
-            "z_B": -rng.uniform(0.1, 1),
-            "m_H": rng.uniform(0.2, 9),
-            "x_H": rng.uniform(0.7, 1.3),
-            "z_H": -rng.uniform(0.1, 1),
-        }
+        low, high = (1, 1, 9.81, -1, 10, 0.2, -1, 0.2, 0.7, -1), (1, 12, 9.81, 1, 10, 2, -0.1, 9, 1.3, -0.1)
+        p = dict(zip(ROBOT, rng.uniform(low, high).tolist(), strict=True))
         found = inertia_margin(p)
         assert (found is not None) == (abscissa(p) < 0)
         for name, x in (found or {}).items():

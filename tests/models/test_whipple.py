@@ -486,14 +486,12 @@ def test_speeds_command(run):
     assert run("speeds", "problems/chart.toml")[0] == 2
 
 
-def test_report_of_a_whipple_bicycle(tmp_path, run):
-    path = tmp_path / "growth.png"
-    code, out, _ = run("solve", "problems/whipple_benchmark.toml", "--full", "--plot", path)
+def test_report_of_a_whipple_bicycle(run):
+    code, out, _ = run("solve", "problems/whipple_benchmark.toml")
     assert code == 0
-    for words in ("; stands on both wheels", "v_capsize         6.02426201539", "1/s", "I_Hxz"):
+    for words in ("; stands on both wheels", "from 4.2924 to 6.0243 m/s", "1/s"):
         assert words in out
     assert "dimensionless" not in out
-    assert path.stat().st_size > 10_000
 
 
 def test_import_command(tmp_path, run):
