@@ -41,7 +41,12 @@ def doubles(coefficients, unit=1.0):
 
 
 def named(items):
-    """Roots on the rightmost line: higher multiplicities first, then pairs, then a simple real root."""
+    """Roots on the rightmost line: higher multiplicities first, then pairs, then a simple real root.
+
+    A quartic with two real double roots is 2EP2 wherever they are, and one with a double pair is CEP2.
+    """
+    if sorted((m, im == 0) for _, im, m in items) == [(2, True)] * 2:
+        return "2EP2"
     right = max(re for re, _, _ in items)
     line = [(m, im == 0) for re, im, m in items if re == right]
     parts = [("EP" if real else "CEP") + str(m) for m, real in sorted(line, reverse=True) if m > 1]
@@ -76,10 +81,10 @@ def random_items(rng, degree):
     return items
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3, 5, 6, 7, 8])
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 5, 6, 8])
 def test_every_structure_is_found_in_any_unit_of_time(degree):
     rng = np.random.default_rng(degree)
-    for _ in range(15):
+    for _ in range(80 if degree == 4 else 12):
         items = random_items(rng, degree)
         unit = 10.0 ** rng.integers(-6, 7)
         found = structure(-0.3 * doubles(polynomial(items), unit), 1e-11)
