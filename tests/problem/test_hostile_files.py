@@ -58,11 +58,11 @@ def test_a_file_larger_than_files_need_is_refused_at_its_line(tmp_path, kind):
     ("entry", "line"), {"b{} = 1": "unknown parameter 'b0'", "b{} = []": "found []", "b{0} = {{x = 1}}": "b0"}.items()
 )
 def test_the_first_faults_are_listed_and_the_rest_is_counted(tmp_path, entry, line):
-    text = GOOD + "".join(entry.format(k) + "\n" for k in range(10_000))
+    text = GOOD + "".join(entry.format(k) + "\n" for k in range(4_000))
     found = refused(tmp_path / "p.toml", text)
     assert line in found[0]
     assert len(found) == errors.MAX_LISTED + 1
-    assert int(found[-1].removeprefix("and ").removesuffix(" more")) + errors.MAX_LISTED >= 10_000
+    assert int(found[-1].removeprefix("and ").removesuffix(" more")) + errors.MAX_LISTED >= 4_000
 
 
 def test_a_text_of_several_lines_and_a_list_do_not_move_the_lines(tmp_path):

@@ -69,11 +69,7 @@ EVERY = PLANES | {
 
 
 def native(values):
-    if "w" not in values:
-        return values
-    lengths = {f"{n}_{k}": values[f"{s}_{k}"] / values["w"] for n, s in (("chi", "x"), ("zeta", "z")) for k in "BH"}
-    speed = values["v"] / math.sqrt(values["g"] * values["w"])
-    return lengths | {"Fr": speed, "mu": values["m_H"] / values["m_B"], "lambda_s": values["lambda_s"]}
+    return tms.sets[1].native(values) if "w" in values else values
 
 
 class Plane:
