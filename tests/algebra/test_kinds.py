@@ -168,8 +168,7 @@ def test_what_is_certain_is_left_out():
         make_node("tan", make_node("atan", x)),
     ):
         assert same is x
-    assert zero.fraction == 0
-    assert (x - x).fraction == 0
+    assert zero.fraction == (x - x).fraction == 0
     assert formula([x * 0.0]).inputs == ("x",)  # which makes of infinity what is no number
     assert [step.op for step in formula([x * x, x**2, x**0.5]).steps] == ["input", "square", "sqrt"]
 
