@@ -475,19 +475,19 @@ def _leaves(answer):
 def test_every_law_broadcasts(law, arguments):
     """An array for one argument gives, entry by entry, what the floats give; lists are taken too."""
     plain = _leaves(law(**arguments))
-    for leaf in plain:
-        assert isinstance(leaf, np.ndarray) == (law.__name__ in ("matrices", "copo", "lscf", "poly4", "a1a3"))
-    for name in arguments:
-        varied = arguments | {name: np.array([[arguments[name]] * 3, [1.1 * arguments[name]] * 3])}
-        for leaf, part in zip(_leaves(law(**varied)), plain, strict=True):
+    for name, value in arguments.items():
+        for leaf, part in zip(
+            _leaves(law(**arguments | {name: np.array([[value] * 3, [1.1 * value] * 3])})), plain, strict=True
+        ):
             if np.ndim(leaf) == np.ndim(part):  # an output this argument does not enter
                 assert np.array_equal(leaf, part, equal_nan=True)
-                continue
-            own = leaf[0, 0] if law.__name__ == "matrices" else leaf[..., 0, 0]
-            assert leaf.shape == ((2, 3, *np.shape(part)) if law.__name__ == "matrices" else (*np.shape(part), 2, 3))
-            assert np.array_equal(own, part, equal_nan=True)
-    listed = {name: [value] for name, value in arguments.items()}
-    for leaf, part in zip(_leaves(law(**listed)), plain, strict=True):
+            elif law.__name__ == "matrices":
+                assert np.array_equal(leaf[0], [part] * 3)
+            else:
+                assert leaf.shape == (*np.shape(part), 2, 3)
+                assert np.array_equal(leaf[..., 0, 0], part, equal_nan=True)
+    listed = law(**{name: [value] for name, value in arguments.items()})
+    for leaf, part in zip(_leaves(listed), plain, strict=True):
         assert np.array_equal(np.squeeze(leaf), part, equal_nan=True)
 
 

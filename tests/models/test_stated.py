@@ -15,7 +15,6 @@ from scipy.optimize import differential_evolution
 import tmsopt
 from tmsopt.models import CONSTANTS, FUNCTIONS, TAKEN, Unfit, from_coefficients, from_matrices, latex
 from tmsopt.problem import ROOT_NAMES
-from tmsopt.studies import definition
 
 PENDULUMS = """
 [model]
@@ -152,18 +151,14 @@ def test_a_leading_coefficient_is_left_out_only_where_it_is_nought_for_all(lead,
 
 
 def test_singular_mass_matrices():
-    """Singular in decimals, though not in binary."""
-    assert Fraction(0.1) * Fraction(2.1) != Fraction(0.7) * Fraction(0.3)
+    """Singular in decimals, though not in binary; and a mass without inertia, coupled by a lever of length c."""
     model = from_matrices([[0.1, 0.7], [0.3, 2.1]], [[k, 0], [0, 1]], [[1, 0], [0, k]])
     # By hand: 0.1 + 2.1 k; 0.1 k + 2.1 + k; k² + 1; k.
     assert [float(x) for x in model.coefficients({"k": 2.0})] == pytest.approx([4.3, 4.3, 5, 2], rel=1e-15)
     with pytest.raises(Unfit, match="without s"):
         from_matrices([[0]], None, [[k]])
-    # A mass without inertia, m q″ coupled by a lever of length c: M is of rank 1, and the first two coefficients are
-    # det M and M × D, which without damping is 0 too.
-    model = from_matrices([[k, k / c], [k / c, k / c**2]], None, [[1, 0], [0, k]])
-    assert model.degree == 2
-    assert [float(x) for x in model.coefficients({"k": 2.0, "c": 4.0})] == pytest.approx([2 * 2 + 2 / 16, 0, 2])
+    lever = from_matrices([[k, k / c], [k / c, k / c**2]], None, [[1, 0], [0, k]])
+    assert [float(x) for x in lever.coefficients({"k": 2.0, "c": 4.0})] == pytest.approx([2 * 2 + 2 / 16, 0, 2])
 
 
 def test_quantities_may_use_one_another_and_stand_in_entries(tmp_path):
@@ -438,16 +433,10 @@ def test_small_roots_of_a_stiff_system_are_not_called_double():
 def test_a_study_is_not_gone_on_with_after_the_model_changed(tmp_path, run):
     own = "[model]\ncoefficients = [1, 'x', '{}*y']\n[parameters]\nx = {{ min = 0, max = 9 }}\ny = 1\n[objective]\nminimize = 'abscissa'"
     study = write(tmp_path, "problem = 'problem.toml'\n[study]\nmethod = 'grid'\n[vary]\ny = [1, 4]\n", "study")
-    store = tmp_path / "rows.sqlite"
-    write(tmp_path, own.format("1"))
-    assert run("study", study, "--store", store)[0] == 0
-    rows = tmsopt.run_study(tmsopt.load_study(study), store)
-    assert np.allclose(rows.column("abscissa"), [-1, -2], atol=1e-12)
-    first = definition(tmsopt.load_study(study))
-    write(tmp_path, own.format("1.000000001"))
-    assert definition(tmsopt.load_study(study)) != first
-    code, out, err = run("study", study, "--store", store)
-    assert code == 2
+    for written_as, status in (("1", 0), ("1.000000001", 2)):
+        write(tmp_path, own.format(written_as))
+        code, out, err = run("study", study, "--store", tmp_path / "rows.sqlite")
+        assert code == status, err
     assert 'coefficients[0][2]: "y" in the store, "(1.000000001 * y)" in the file' in out + err
 
 

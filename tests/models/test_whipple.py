@@ -12,14 +12,13 @@ import mpmath
 import numpy as np
 import pytest
 from helpers.bicycles import BENCHMARK, MATRICES, appendix, bicycles
-from helpers.designs import designs
 from helpers.oracles import ep4_of_heights
 from mpmath import mp
 
 import tmsopt
 from tmsopt import laws
 from tmsopt.dynamics import find_crossings
-from tmsopt.models import MODELS, Values, canonical, copo, problem_text, spin, to_si, whipple
+from tmsopt.models import MODELS, Values, canonical, copo, problem_text, spin, whipple
 from tmsopt.roots import exact_roots, quadratic_pencil
 
 SI = whipple.sets[0]
@@ -114,21 +113,17 @@ def test_without_wheels_and_trail_it_is_tms_identically():
 
 def test_no_wheel_is_no_division():
     """S = I/r is 0 for a wheel that has no inertia, in every arithmetic, and nan for one that has but no radius."""
-    assert spin(0.0, 0.0) == spin(0.0, 0.3) == 0
+    for number in (float, flint.fmpq, flint.arb):
+        assert spin(number(0), number(0)) == 0
+        assert spin(number(3), number(2)) == number(3) / number(2)
     assert math.isnan(spin(0.1, 0.0))
-    np.testing.assert_array_equal(spin(np.array([0.0, 0.12]), np.array([0.0, 0.3])), [0.0, 0.12 / 0.3])
-    assert spin(flint.fmpq(0), flint.fmpq(0)) == 0
-    assert spin(flint.fmpq(1, 2), flint.fmpq(1, 4)) == 2
-    assert spin(flint.arb(0), flint.arb(0)) == 0
     assert not spin(flint.arb(1), flint.arb(0)).is_finite()
+    np.testing.assert_array_equal(spin(np.array([0.0, 0.12]), np.array([0.0, 0.3])), [0.0, 0.12 / 0.3])
     symbols = ca.SX.sym("I"), ca.SX.sym("r")
     function = ca.Function("S", symbols, [spin(*symbols), ca.jacobian(spin(*symbols), ca.vertcat(*symbols))])
     value, slopes = function(0, 0)
     assert float(value) == 0
     assert np.all(np.isfinite(np.array(slopes)))
-    for p in designs(3):
-        a = whipple.coefficients({n: flint.arb(x) for n, x in ({**NONE, **to_si(p)}).items()})
-        assert all(c.is_finite() for c in a)
 
 
 def test_what_is_left_out_is_not_there():
@@ -452,10 +447,8 @@ def test_ep4_unfolds_by_the_fourth_root(unfold, wheels, trail):
 def test_the_trail_that_holds_ep4_leaves_by_the_third_root(unfold):
     """With p(r) held to first order: σ⁴ + ε q₁ σ = 0, so three roots at (−ε q₁)^(1/3)."""
     held = flint.fmpq(*float(unfold["held_trail"]()).as_integer_ratio())
-    last, slope = unfold["first_order"](1, held)
-    assert abs(last) < 1e-6 * abs(unfold["first_order"](1, 0)[0])
-    moved = unfold["displacements"](flint.fmpq(1, 10**9), 1, held)
-    expected = np.roots([1, 0, 0, slope * 1e-9])
+    _, slope = unfold["first_order"](1, held)
+    moved, expected = unfold["displacements"](flint.fmpq(1, 10**9), 1, held), np.roots([1, 0, 0, slope * 1e-9])
     assert all(np.abs(moved - z).min() < 0.05 * abs(z) for z in expected)
     assert np.abs(moved).min() < 0.1 * np.abs(expected).min()
 
