@@ -63,18 +63,11 @@ ORACLE = {
     "text",
     [
         *(f"{name}(x)" for name in FUNCTIONS[:10]),
-        "min(x, y)",
         "max(x, y, 0.3)",
         "min(y, x, 2)",
-        "x**2 - y**-3",
-        "(-y)**3",
-        "y**0.5",
-        "2**x",
-        "y**x",
-        "x/3 + one/7",
-        "-pi*x",
-        "abs(x - y) - 0.1",
-        "3",
+        "(-x)**3 - x**-3",
+        "x**0.5*y**x",
+        "x/3 - pi*abs(x - y) + one/7",
     ],
 )
 def test_expressions_over_balls_enclose_the_60_digit_value(text):
@@ -94,7 +87,7 @@ def test_expressions_over_balls_enclose_the_60_digit_value(text):
         assert float(slope) == pytest.approx(float((up - down) / (2 * step)), rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("text", ["log(-x)", "sqrt(-x)", "asin(2*x)", "x/(y - y)", "(-x)**0.5", "(y - y)**-1"])
+@pytest.mark.parametrize("text", ["log(-x)", "asin(2*x)", "x/(y - y)", "(-x)**0.5"])
 def test_expressions_without_a_value_are_nan(text):
     got = parse_value(text, ["x", "y"]).of({"x": exact(0.7), "y": exact(1.9)}, BALLS)
     assert not flint.arb(got).is_finite()

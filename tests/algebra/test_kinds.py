@@ -113,11 +113,8 @@ def test_no_operation_is_left_out():
 
 def test_what_does_not_exist_is_nan_of_every_kind():
     x, y = symbol("x"), symbol("y")
-    own = formula(
-        [make_node("quotient_or_nan", x, y), make_node("quotient_or_zero", x, y), make_node("sqrt", -x)], ("x", "y")
-    )
-    at = {"x": 1.0, "y": 0.0}
-    s = ca.SX.sym("x", 2)
+    nodes = make_node("quotient_or_nan", x, y), make_node("quotient_or_zero", x, y), make_node("sqrt", -x)
+    own, at, s = formula(nodes, ("x", "y")), {"x": 1.0, "y": 0.0}, ca.SX.sym("x", 2)
     written = ca.Function("f", [s], [ca.vertcat(*values(own, {"x": s[0], "y": s[1]}))])
     assert np.isnan(np.array(values(own, at), dtype=float)).all()
     assert np.isnan(np.array(written([1.0, 0.0])).ravel()[[0, 2]]).all()

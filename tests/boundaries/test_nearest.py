@@ -129,33 +129,6 @@ def _damped(columns):
     return (np.abs(z.imag).max(axis=-1) <= 1e-6 * np.abs(z).max(axis=-1)) & (z.real.max(axis=-1) < 0)
 
 
-@pytest.mark.parametrize("name", DESIGNS)
-@pytest.mark.parametrize("kind", ["weave", "capsize", "infinity"])
-def test_first_order_condition(name, kind):
-    """The displacement, in weights, is parallel to the gradient of Δ3, a4 or a0 (exact derivatives by SymPy) unless
-    the point is a corner, where another of the tests vanishes too."""
-    design = DESIGNS[name]
-    found = nearest(problem(design), kind)
-    if not found.found:
-        pytest.skip("no such boundary in the physical ranges")
-    a, symbols = symbolic_copo()
-    tests = {"capsize": a[4], "infinity": a[0], "weave": a[1] * a[2] * a[3] - a[0] * a[3] ** 2 - a[4] * a[1] ** 2}
-    own = {n: symbols["T" if n == "lambda_s" else n] for n in NAMES}
-    at = {own[n]: math.tan(v) if n == "lambda_s" else v for n, v in found.parameters.items()}
-    size = max(abs(float(x.subs(at))) for x in a)
-    off = {n: abs(float(t.subs(at))) / size ** (3 if n == "weave" else 1) for n, t in tests.items()}
-    assert off[kind] <= 1e-10
-    if sum(x <= 1e-8 for x in off.values()) > 1:
-        return  # a corner: the displacement lies between two normals
-    u = np.array(list(found.direction.values()))
-    weights = {n: abs(v) for n, v in design.items()}
-    weights["lambda_s"] *= 1 + at[own["lambda_s"]] ** 2
-    slope = np.array([weights[n] * float(sympy.diff(tests[kind], own[n]).subs(at)) for n in NAMES])
-    cosine = abs(u @ slope) / (np.linalg.norm(u) * np.linalg.norm(slope))
-    assert cosine == pytest.approx(1, abs=1e-10)  # the angle itself is then within 2e-5, the root of that
-    assert found.refined
-
-
 # On the edge, beyond it, and invariances
 
 

@@ -257,15 +257,6 @@ def test_a_root_through_infinity_bounds_heavy_damping():
     assert distance(edge, plane.arcs("heavy_damping")) <= 1e-5
 
 
-def test_the_untilted_axis_bounds_stability_at_chi_H_1():
-    plane = Plane(BASE | {"Fr": FR_EP4 + 0.5}, {"chi_B": (1.1, 1.9), "lambda_s": (-0.5, 0.5)}, starts=8)
-    edge = plane.unit({"chi_B": 1.6, "lambda_s": 0.0})
-    up = np.array([0.0, 1e-6])
-    assert stable(plane.polynomial(edge + up))
-    assert not stable(plane.polynomial(edge - up))
-    assert distance(edge, plane.arcs("stability")) <= 1e-5
-
-
 @pytest.mark.parametrize("sign", [1, -1])
 def test_where_a0_and_a4_vanish_together_it_matters_whether_in_turn(sign):
     """x s⁴ + s³ + 3 s² + s ± x: at x = 0 its other roots are stable; one side of it is stable only for +."""
