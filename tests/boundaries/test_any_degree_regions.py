@@ -6,7 +6,6 @@ cᵢ = 0, capsize at kᵢ = 0, heavy damping at cᵢ² = 4 kᵢ.
 
 from fractions import Fraction
 
-import casadi as ca
 import numpy as np
 import pytest
 from helpers import curves
@@ -229,8 +228,7 @@ def test_a_chart_of_a_cubic_is_that_of_the_routh_condition():
 
 def test_growth_of_a_model_without_speed():
     """s² + c s + 1 over c: stable for c > 0, heavily damped for c > 2."""
-    c, k = ca.SX.sym("c"), ca.SX.sym("k")
-    of = from_coefficients([1, c, k])
+    of = from_coefficients([1, "c", "k"])
     design = solve(Problem(model=of, fixed={"k": 1.0}, free={"c": (-1.0, 5.0)}, minimize="(c - 2)**2"))
     data = growth(design)
     assert data.over.name == "c"
@@ -238,9 +236,7 @@ def test_growth_of_a_model_without_speed():
     assert data.stable == (pytest.approx((0.0, 5.0), abs=1e-12),)
     assert data.heavily_damped == ((2.0, 5.0),)
     assert np.isnan(data.critical)
-    assert data.roots.shape == (len(data.values), 2)
     assert len(growth_figure(data, "title").axes) == 2
-    assert growth(design, over="k").over.name == "k"
 
 
 def test_the_instant_bound_of_a_high_power_of_one_parameter():

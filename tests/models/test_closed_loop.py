@@ -62,7 +62,6 @@ def test_a_file_states_it(tmp_path):
     [
         ({"B": [[1], [0]]}, "G", "missing"),
         ({"G": [["k", 0]]}, "B", "missing"),
-        ({"B": [[1]], "G": [["k", 0]]}, "B", "accepted: 2"),
         ({"B": [[1], [0]], "G": [["k"]]}, "G", "1 × 1; accepted: 1 × 2"),
         ({"B": [[1], [0]], "G": [["k"]], "C": [[1]]}, "C", "accepted: 2"),
         ({"B": [[1], [0, 1]], "G": [["k", 0]]}, "B", "rows of equal length"),

@@ -11,7 +11,6 @@ from helpers.oracles import matrices
 
 import tmsopt
 from tmsopt.models import controlled, from_si, tms, whipple
-from tmsopt.roots import exact_roots
 
 STATES = ("phi", "delta", "phidot", "deltadot")
 STEER = tuple(f"k_{x}" for x in STATES)
@@ -151,21 +150,6 @@ def test_skates_without_dimensions_are_those_in_si(kind):
         one = model.coefficients(given, model.parameter_set("SI"))
         assert all((a / got[0]).overlaps(b / one[0]) for a, b in zip(got, one, strict=True))
         assert set(model.sets[0].names) == {*from_si(given), *own}
-
-
-@pytest.mark.parametrize("lag", [1e-3, 1e-5, 1e-7])
-def test_a_short_lag_is_none(lag):
-    """To first order: a root s of p moves by −lag s p₁(s)/p′(s), p₁ the part without the gains; one more is near −1/lag."""
-    k = {"k_phi": -100.0, "k_phidot": -30.0, "k_delta": 20.0, "k_deltadot": 3.0}
-    design = {**BENCHMARK, "v": 2.0, **k}
-    without = roots(controlled(whipple, k).coefficients(design))
-    *near, far = sorted(roots(controlled(whipple, (*k, "lag")).coefficients({**design, "lag": lag})), key=abs)
-    assert abs(far * lag + 1) <= 100 * lag
-    assert all(min(abs(z - s) for s in near) <= 1e3 * lag for z in without)
-
-
-def roots(coefficients):
-    return [complex(r.re, r.im) for r in exact_roots(coefficients) for _ in range(r.multiplicity)]
 
 
 # Poles where one wants them

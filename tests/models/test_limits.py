@@ -33,7 +33,6 @@ REFUSED = {
     "0**-1*Fr": "'0**-1' is inf",
     "2 + 1/0": "'1/0' divides by 0",
     "Fr/(2 - 2)": "'Fr/(2 - 2)' divides by 0",
-    "1e308*1e308*Fr": "'1e308*1e308' is inf",
     "exp(exp(exp(exp(9)))) + Fr": "'exp(exp(9))' is inf",
     "Fr*log(-1)": "'log(-1)' is nan",
     "(-1)**0.5*Fr": "'(-1)**0.5' is nan",

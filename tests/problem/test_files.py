@@ -127,13 +127,6 @@ def test_all_faults_of_a_file_at_once(write):
     assert [f.line for f in caught.value.faults] == [7, 8, 17]
 
 
-def test_same_faults_from_python():
-    with pytest.raises(tmsopt.InputError, match="did you mean 'chi_B'"):
-        tmsopt.Problem(tmsopt.models.tms, fixed={"chi_b": 1.0}, minimize="abscissa")
-    with pytest.raises(tmsopt.InputError, match="swap"):
-        tmsopt.Problem(tmsopt.models.tms, free={"Fr": (2, 1)}, minimize="abscissa")
-
-
 UNREADABLE = {
     "huge": b"# " + b"x" * (10 * MAX_FILE_BYTES),
     "not text": b'title = "\xff\xfe"\n',
@@ -157,12 +150,6 @@ def test_missing_file_suggests_a_neighbour(write):
     path = write(GOOD)
     with pytest.raises(tmsopt.InputError, match=r"did you mean 'problem\.toml'"):
         tmsopt.load(path.with_name("problm.toml"))
-
-
-def test_minimum_equal_to_maximum_fixes(write):
-    problem = tmsopt.load(write(GOOD.replace("max = 5", "max = 1.01")))
-    assert problem.fixed["chi_B"] == 1.01
-    assert "chi_B" not in problem.free
 
 
 @pytest.mark.parametrize("path", sorted(set(Path("problems").glob("*.toml")) - STUDIES), ids=lambda p: p.stem)

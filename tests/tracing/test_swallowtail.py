@@ -146,11 +146,8 @@ def test_the_drawn_faces_are_those_of_the_patches(surface):
     faces = sum((p.r.shape[0] - 1) * (p.r.shape[1] - 1) for p in surface.patches)
     assert len(collection.get_facecolor()) == faces  # one collection: matplotlib sorts its faces by depth
     grid = np.arange(24.0).reshape(2, 4, 3)
-    pieces = quadrilaterals(grid)
-    assert pieces.shape == (3, 4, 3)
-    assert pieces[0].tolist() == [grid[0, 0].tolist(), grid[0, 1].tolist(), grid[1, 1].tolist(), grid[1, 0].tolist()]
     grid[0, 0] = np.nan
-    assert len(quadrilaterals(grid)) == 2
+    assert len(quadrilaterals(grid)) == 2  # of three, where a corner is missing
 
 
 # The planes of the paper

@@ -120,7 +120,6 @@ def in_unit_of_time(unit, rng, n):
 
 FAMILIES = {
     "normal": lambda rng, n: rng.normal(size=(n, 5)),
-    "positive": lambda rng, n: rng.uniform(0.01, 1, size=(n, 5)),
     "sizes over 16 decades": lambda rng, n: rng.normal(size=(n, 5)) * 10 ** rng.uniform(-8, 8, (n, 5)),
     "small integers": lambda rng, n: np.concatenate([np.ones((n, 1)), rng.integers(-3, 4, (n, 4))], axis=1),
     "two-mass-skate designs": lambda rng, n: np.stack(tms.coefficients(wide_designs(99, n)), axis=-1),
@@ -174,17 +173,6 @@ def test_abscissa_is_that_of_ball_arithmetic():
     expected = np.array([exact_abscissa(row.tolist()) for row in a])
     assert np.all(np.abs(found.abscissa - expected) <= 8000 * 1e-14 * 4 * size)
     assert np.median(np.abs(found.abscissa - expected) / size) < 1e-15
-
-
-@pytest.mark.parametrize("family", ["normal", "random roots", "two-mass-skate designs", "near EP4", "roots at 0"])
-def test_abscissa_and_damping_are_those_of_the_roots(family):
-    a = made(family)
-    found = abscissa_and_damping(*a.T)
-    z = quartic_factors(*a.T).roots
-    size = np.abs(z).max(axis=1)
-    assert np.all(np.abs(found.abscissa - z.real.max(axis=1)) <= 4e-16 * size)
-    ratio = np.min(np.where(z == 0, 0, -z.real / np.where(z == 0, 1, np.abs(z))), axis=1)
-    assert np.abs(found.damping_ratio - ratio).max() <= 1e-15
 
 
 @pytest.mark.parametrize(
