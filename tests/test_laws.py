@@ -11,24 +11,17 @@ from math import comb
 import numpy as np
 import pytest
 import sympy
-from helpers import oracles
+from helpers import curves, oracles
+from helpers.designs import wide_designs
 from hypothesis import assume, given, settings, strategies as st
 from mpmath import mp
 
 from tmsopt import laws
 
-BENCH = {
-    "mu": laws.bench["m_H"] / laws.bench["m_B"],
-    "chi_B": laws.bench["x_B"] / laws.bench["w"],
-    "chi_H": laws.bench["x_H"] / laws.bench["w"],
-    "zeta_B": laws.bench["z_B"] / laws.bench["w"],
-    "zeta_H": laws.bench["z_H"] / laws.bench["w"],
-    "lambda_s": laws.bench["lambda_s"],
-}
 ZB, ZH = -0.4, -0.2  # the heights of every design in the paper
 EP4_TILT = np.arctan(15 / 4 - 75 / 32 * np.sqrt(2))  # Table 1
 
-repeatable = settings(max_examples=100, deadline=None, derandomize=True)
+repeatable = settings(max_examples=60, deadline=None, derandomize=True)
 depth = st.floats(-2.0, -0.05)
 tangent = st.floats(0.05, 5.0)
 
@@ -42,17 +35,9 @@ def _sixty_digits():
 
 def designs(count, seed):
     """Random designs of both signs of lambda_s, half of them with chi_H near 1, as floats."""
-    rng = np.random.default_rng(seed)
+    rng, found = np.random.default_rng(seed), wide_designs(seed, count)
     near = rng.uniform(size=count) < 0.5
-    return {
-        "Fr": rng.uniform(0.05, 6, count),
-        "mu": 10 ** rng.uniform(-1.5, 1.5, count),
-        "chi_B": rng.uniform(-1, 3, count),
-        "chi_H": np.where(near, rng.uniform(0.8, 1.2, count), rng.uniform(-1, 3, count)),
-        "zeta_B": -(10 ** rng.uniform(-1.3, 0.3, count)),
-        "zeta_H": -(10 ** rng.uniform(-1.3, 0.3, count)),
-        "lambda_s": np.arctan(rng.uniform(-3, 3, count)),
-    }
+    return {**found, "chi_H": np.where(near, rng.uniform(0.8, 1.2, count), found["chi_H"])}
 
 
 def one(parameters, i):
@@ -86,9 +71,9 @@ def ep4_defect(design, mu, chi_H, zeta_B, zeta_H):
 
 def test_the_printed_coefficients_are_the_determinant():
     """`copo` against det(M s^2 + V s + P)/(mu nu_H cos) from the printed matrices, at 60 digits."""
-    parameters = designs(200, seed=1)
+    parameters = designs(100, seed=1)
     a = laws.copo(**parameters)
-    for i in range(200):
+    for i in range(100):
         design = one(parameters, i)
         sizes = term_sizes(*list(design.values())[:-1], np.tan(design["lambda_s"]))
         for mine, true, size in zip(a[:, i], oracles.polynomial_60(**design), sizes, strict=True):
@@ -97,46 +82,18 @@ def test_the_printed_coefficients_are_the_determinant():
 
 
 def test_matrices_give_copo():
-    parameters = designs(50, seed=2)
-    M, V, P = laws.matrices(**parameters)
-    assert M.shape == V.shape == P.shape == (50, 2, 2)
-    nu_H = (parameters["chi_H"] - 1) * np.cos(parameters["lambda_s"]) - parameters["zeta_H"] * np.sin(
-        parameters["lambda_s"]
-    )
+    p = designs(50, seed=2)
+    M, V, P = laws.matrices(**p)
+    cos, sin = np.cos(p["lambda_s"]), np.sin(p["lambda_s"])
+    common = p["mu"] * ((p["chi_H"] - 1) * cos - p["zeta_H"] * sin) * cos
     for s in (0.7, -1.3 + 0.4j):
-        determinant = np.linalg.det(M * s**2 + V * s + P)
-        scale = np.linalg.norm(M * s**2 + V * s + P, axis=(1, 2)) ** 2
-        value = np.polyval(laws.copo(**parameters), s) * parameters["mu"] * nu_H * np.cos(parameters["lambda_s"])
-        assert np.all(abs(determinant - value) < 1e-13 * scale)
+        L = M * s**2 + V * s + P
+        assert L.shape == (50, 2, 2)
+        off = np.linalg.det(L) - np.polyval(laws.copo(**p), s) * common
+        assert np.all(abs(off) < 1e-13 * np.linalg.norm(L, axis=(1, 2)) ** 2)
 
 
-def test_poly4_is_the_product_of_its_roots():
-    assert np.array_equal(laws.poly4(-1.5), [complex(c).real for c in oracles.elementary([-1.5] * 4)])
-
-
-# Printed numbers. `units` is how many units of the last printed digit the paper may be off: 1/2, and more where
-# its ten-digit arithmetic has spoilt the last one.
-
-PRINTED = [
-    ("fr1 Fr_c", laws.Fr_c(**BENCH), "0.9070641497", 1.6),
-    ("fr1 v_c", laws.Fr_c(**BENCH) * np.sqrt(9.81 * laws.bench["w"]), "2.841008324", 0.7),
-    ("chi_B of omega0 = -1", laws.chib(-1, 1.02, ZB, ZH), "1.19", 0.5),
-    ("optimised Fr", laws.ep4(-1, ZB, ZH, 1.02)[0].Fr, "2.337214017", 0.5),
-    ("optimised mu", laws.ep4(-1, ZB, ZH, 1.02)[0].mu, "20.84626701", 0.5),
-    ("optimised lambda_s", laws.ep4(-1, ZB, ZH, 1.02)[0].lambda_s, "0.8514403685", 0.5),
-    ("EP4 Fr_EP", laws.frep4(ZB, ZH)[0], "2.236317517", 1.4),
-    ("2EP2 Fr_c", laws.frm(ZB, ZH, EP4_TILT - 0.05), "1.482682090", 2.5),
-    ("2EP2 Fr_EP", laws.epset(ZB, ZH, EP4_TILT - 0.05), "2.257421384", 5.1),
-    ("CEP2 Fr_c", laws.frm(ZB, ZH, EP4_TILT + 0.80), "3.934331969", 5.8),
-    ("CEP2 Fr_EP", laws.epset(ZB, ZH, EP4_TILT + 0.80), "4.103508160", 3.2),
-    ("experimental machine", laws.chib1(-1.158, -0.526), "1.484", 0.5),
-]
-
-
-@pytest.mark.parametrize(("value", "printed", "units"), [row[1:] for row in PRINTED], ids=[row[0] for row in PRINTED])
-def test_printed_decimals(value, printed, units):
-    unit = 10.0 ** -len(printed.partition(".")[2])
-    assert abs(value - float(printed)) <= units * unit
+# Printed numbers; those with decimals are in the ledger of the paper
 
 
 @pytest.mark.parametrize(
@@ -170,33 +127,17 @@ def test_the_benchmark_equations_are_the_general_ones():
     assert np.allclose(laws.e1(Fr, mu, lambda_s), ZB * laws.a2(Fr, mu, 1.02, ZB, ZH, lambda_s, -1), atol=1e-14)
 
 
-def test_the_benchmark_equations_have_two_solutions_one_with_positive_mass_ratio():
-    """The paper's uniqueness claim, by exact elimination; `ep4` returns both solutions."""
-    printed = (
-        "-0.432*T - 0.0272 + 0.08*Fr**2 + 0.004*mu",
-        "0.368*T - 0.02*mu - 0.0032",
-        "0.192*T - 0.0048 - 0.136*Fr + 0.08*Fr**2 - 0.016*mu",
-    )
-    system = [sympy.sympify(left, rational=True) for left in printed]
-    Fr, mu, T = sympy.symbols("Fr mu T")
-    solutions = sorted(sympy.solve(system, [Fr, mu, T], dict=True), key=lambda solution: -solution[mu])
-    assert [solution[mu] > 0 for solution in solutions] == [True, False]
-    for design, solution in zip(laws.ep4(-1, ZB, ZH, 1.02), solutions, strict=True):
-        for value, true in ((design.Fr, Fr), (design.mu, mu), (design.tan_lambda_s, T)):
-            assert value == pytest.approx(float(solution[true].evalf(30)), rel=2e-14)
-
-
 # Stability
 
 
 def test_flus_is_where_the_60_digit_determinant_vanishes():
     """Every chi_H, both signs of lambda_s; where the square is negative there is no root to find."""
-    parameters = designs(60, seed=4)
+    parameters = designs(30, seed=4)
     del parameters["Fr"]
     squares = laws.flus(**parameters)
     inside = (squares > 1e-6) & (squares < 1e6)
-    assert 15 < inside.sum() < 45
-    for i in range(60):
+    assert 7 < inside.sum() < 23
+    for i in range(30):
         found = oracles.weave_Fr_60(**one(parameters, i))
         if inside[i]:
             assert laws.Fr_c(**one(parameters, i)) == pytest.approx(float(found), rel=1e-12)
@@ -220,14 +161,14 @@ def test_stability_begins_at_Fr_c():
 @pytest.fixture(scope="module")
 def judged():
     """Random designs, and whether each is stable by the exact Routh table."""
-    parameters = designs(5000, seed=6)
-    routh = np.array([oracles.routh_exact(exact(**one(parameters, i))) for i in range(5000)])
+    parameters = designs(3000, seed=6)
+    routh = np.array([oracles.routh_exact(exact(**one(parameters, i))) for i in range(3000)])
     return parameters, routh
 
 
 def test_the_complete_conditions_are_exact(judged):
     parameters, routh = judged
-    assert routh.sum() > 100
+    assert routh.sum() > 60
     assert np.array_equal(laws.lscf_complete(**parameters), routh)
 
 
@@ -245,7 +186,7 @@ def test_the_printed_conditions_miss_a1_for_chi_H_below_1(judged):
     printed = laws.lscf(**parameters).all(axis=0)
     assert printed[regime & routh].all()
     wrong = regime & printed & ~routh
-    assert wrong.sum() > 0.3 * (regime & printed).sum() > 10
+    assert wrong.sum() > 0.3 * (regime & printed).sum() > 5
     a1 = laws.copo(**parameters)[1]
     assert (a1[wrong] < 0).all()
     assert np.array_equal((printed & (a1 > 0))[regime], routh[regime])
@@ -285,9 +226,9 @@ def test_a_design_the_printed_conditions_wrongly_admit():
 
 def test_w0_bounds_the_abscissa():
     """The product of the roots is a4/a0: no abscissa lies left of `w0`, nan where that is negative."""
-    parameters = designs(300, seed=7)
+    parameters = designs(100, seed=7)
     bound = laws.w0(*(parameters[name] for name in ("mu", "chi_H", "zeta_B", "zeta_H", "lambda_s")))
-    for i in range(300):
+    for i in range(100):
         a = exact(**one(parameters, i))
         assert np.isnan(bound[i]) == (a[4] / a[0] < 0)
         if a[4] / a[0] > 0:
@@ -330,9 +271,10 @@ def test_ep4_in_the_four_regimes(omega0, zeta_B, zeta_H, chi_H, tilt_sign):
     assert design.lambda_s == pytest.approx(np.arctan(design.tan_lambda_s), rel=1e-15)
     geometry = {"chi_H": chi_H, "zeta_B": zeta_B, "zeta_H": zeta_H, "lambda_s": design.lambda_s}
     a = oracles.polynomial_60(design.Fr, design.mu, design.chi_B, **geometry)
-    assert oracles.routh_exact([_fraction(c) for c in a])
+    assert oracles.is_stable_60(a)
     monic = [float(c / a[0]) for c in a]
-    assert monic == pytest.approx(list(laws.poly4(omega0)), rel=1e-12)  # 1/a0 magnifies the rounding tenfold
+    assert monic == pytest.approx(np.poly([omega0] * 4), rel=1e-12)  # 1/a0 magnifies the rounding tenfold
+    assert np.array_equal(laws.poly4(omega0), np.poly([omega0] * 4))
     assert laws.chib(omega0, chi_H, zeta_B, zeta_H) == design.chi_B
     assert laws.a1a3(design.Fr, design.chi_B, omega0=omega0, **geometry) == pytest.approx(0, abs=1e-14)
     assert laws.a2(design.Fr, design.mu, omega0=omega0, **geometry) == pytest.approx(0, abs=1e-13)
@@ -371,12 +313,7 @@ def test_frep4_has_one_true_and_one_spurious_root(zeta_B, zeta_H):
     r = laws.chib1(zeta_B, zeta_H)
     assert spurious == pytest.approx(-((r - 1) ** 2) * abs(design.omega0) / (4 * (r + 1)), rel=1e-9)
     assert spurious < 0 < true
-    # it solves the printed quadratic
-    w, T = laws.w01(zeta_B, zeta_H), laws.tls(zeta_B, zeta_H)
-    for Fr in (true, spurious):
-        terms = np.array([(w**2 * zeta_B - 1) * Fr**2, 2 * w**3 * zeta_B * Fr, -(w**2 * zeta_B + 1) * T])
-        assert abs(terms.sum()) < 1e-13 * abs(terms).sum()
-    # and with it p is no fourth power: a1 has the wrong sign
+    # with it p is no fourth power: a1 has the wrong sign
     assert ep4_defect(design._replace(Fr=spurious), 0.1, 1.0, zeta_B, zeta_H) > 1e-4
 
 
@@ -455,29 +392,16 @@ def test_dp_bounds_the_tilt_of_heavy_damping(zeta_B, zeta_H):
     assert (chi_B, bound) == pytest.approx((design.chi_B, design.tan_lambda_s), rel=1e-13)
 
     def heavily_damped(tilt):
-        speeds = design.Fr * np.linspace(0.5, 2, 101)
+        speeds = design.Fr * np.linspace(0.5, 2, 41)
         end = laws.epset(zeta_B, zeta_H, np.arctan(tilt))  # near the EP4 the range of speeds is short and ends here
-        speeds = np.append(speeds, [] if np.isnan(end) else end * (1 - np.geomspace(1e-6, 0.1, 50)))
-        spectra = (
-            oracles.certified_roots(oracles.polynomial_exact(Fr, 1, chi_B, 1, zeta_B, zeta_H, tilt)) for Fr in speeds
-        )
-        return any(all(root.imag == 0 and root.real < 0 for root, _ in spectrum) for spectrum in spectra)
+        speeds = np.append(speeds, [] if np.isnan(end) else end * (1 - np.geomspace(1e-6, 0.1, 30)))
+        polynomials = (oracles.polynomial_exact(Fr, 1, chi_B, 1, zeta_B, zeta_H, tilt) for Fr in speeds)
+        return any(curves.damped(a) for a in polynomials)
 
     assert heavily_damped(0.3 * bound)
     assert heavily_damped(0.95 * bound)
     assert not heavily_damped(1.01 * bound)
     assert not heavily_damped(-0.5 * bound)
-
-
-def test_complex_roots_run_on_a_circle():
-    """For chi_B = `chib1` every complex root below the EP set has modulus |omega0| (text)."""
-    lambda_s, chi_B, radius = EP4_TILT + 0.8, laws.chib1(ZB, ZH), -laws.w01(ZB, ZH)
-    for Fr in (2.0, laws.frm(ZB, ZH, lambda_s), 4.0):
-        roots = oracles.roots_60(oracles.polynomial_60(Fr, 0.1, chi_B, 1, ZB, ZH, lambda_s))
-        turning = [root for root in roots if root.imag != 0]
-        assert len(turning) >= 2
-        for root in turning:
-            assert float(abs(root)) == pytest.approx(radius, rel=1e-13)
 
 
 # Duality
@@ -544,19 +468,19 @@ def _leaves(answer):
 def test_every_law_broadcasts(law, arguments):
     """An array for one argument gives, entry by entry, what the floats give; lists are taken too."""
     plain = _leaves(law(**arguments))
-    for leaf in plain:
-        assert isinstance(leaf, np.ndarray) == (law.__name__ in ("matrices", "copo", "lscf", "poly4", "a1a3"))
-    for name in arguments:
-        varied = arguments | {name: np.array([[arguments[name]] * 3, [1.1 * arguments[name]] * 3])}
-        for leaf, part in zip(_leaves(law(**varied)), plain, strict=True):
+    for name, value in arguments.items():
+        for leaf, part in zip(
+            _leaves(law(**arguments | {name: np.array([[value] * 3, [1.1 * value] * 3])})), plain, strict=True
+        ):
             if np.ndim(leaf) == np.ndim(part):  # an output this argument does not enter
                 assert np.array_equal(leaf, part, equal_nan=True)
-                continue
-            own = leaf[0, 0] if law.__name__ == "matrices" else leaf[..., 0, 0]
-            assert leaf.shape == ((2, 3, *np.shape(part)) if law.__name__ == "matrices" else (*np.shape(part), 2, 3))
-            assert np.array_equal(own, part, equal_nan=True)
-    listed = {name: [value] for name, value in arguments.items()}
-    for leaf, part in zip(_leaves(law(**listed)), plain, strict=True):
+            elif law.__name__ == "matrices":
+                assert np.array_equal(leaf[0], [part] * 3)
+            else:
+                assert leaf.shape == (*np.shape(part), 2, 3)
+                assert np.array_equal(leaf[..., 0, 0], part, equal_nan=True)
+    listed = law(**{name: [value] for name, value in arguments.items()})
+    for leaf, part in zip(_leaves(listed), plain, strict=True):
         assert np.array_equal(np.squeeze(leaf), part, equal_nan=True)
 
 
@@ -569,17 +493,3 @@ def test_poles_are_silent():
     assert np.isnan(laws.w0(30, 1.02, ZB, ZH, 0.3))
     assert np.isnan(laws.w01(ZB, -ZH))
     assert not laws.lscf(1, 0.1, 0.5, 1, ZB, ZH, 0.3)[4]
-
-
-def test_every_label_is_a_law():
-    for label in laws.LABELS:
-        assert hasattr(laws, {"4poly": "poly4"}.get(label, label))
-
-
-# The oracles themselves
-
-
-def _fraction(number):
-    """An mpf as it is stored, a dyadic rational."""
-    sign, mantissa, exponent, _ = number._mpf_
-    return (-1) ** sign * Fraction(int(mantissa)) * Fraction(2) ** exponent

@@ -2,7 +2,6 @@
 
 import math
 import re
-from fractions import Fraction
 from importlib import import_module
 
 import flint
@@ -16,28 +15,7 @@ from tmsopt.models import FUNCTIONS, Values, tms, to_si
 from tmsopt.problem import parse_comparison, parse_value
 
 kinds = import_module("tmsopt.algebra.kinds")
-absolute, ball_maximum, ball_minimum, magnitude, positive_part, quotient_or_nan, sqrt, tan = (
-    getattr(kinds, name)
-    for name in [
-        "absolute",
-        "ball_maximum",
-        "ball_minimum",
-        "magnitude",
-        "positive_part",
-        "quotient_or_nan",
-        "sqrt",
-        "tan",
-    ]
-)
-
 HALF = flint.fmpq(1, 2)
-
-
-def middle(ball):
-    if isinstance(ball, flint.fmpq):
-        return Fraction(int(ball.p), int(ball.q))
-    mantissa, exponent = ball.mid().man_exp()
-    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
 
 
 def series(x):
@@ -48,7 +26,7 @@ def series(x):
 def test_every_quantity_of_balls_encloses_what_doubles_give(of):
     """Balls and exact fractions agree with doubles to the conditioning of doubles, and are nan where doubles are nan."""
     seen = 0
-    for native in designs(60):
+    for native in designs(30):
         p = to_si(native, w=1.7, m_B=11.0) if of.name == "SI" else native
         names = [q.name for q in (*tms.quantities, *of.quantities)]
         plain = Values(tms, of, p)
@@ -63,24 +41,13 @@ def test_every_quantity_of_balls_encloses_what_doubles_give(of):
                         assert float(ball) == pytest.approx(float(plain[name]), rel=1e-9, abs=1e-13)
                         assert ball.rad() <= abs(ball) * 1e-45 + 1e-45
                         seen += 1
-    assert seen > 500
+    assert seen > 250
 
 
 def test_a_weave_speed_of_0_is_exactly_0():
     """ζ_B = ζ_H and χ_H = 1 in SI: x_H/w − 1 and z_B/w − z_H/w are exactly 0 in fractions, perhaps not in doubles."""
-    p = {
-        "w": 0.7,
-        "v": 3.0,
-        "g": 9.81,
-        "lambda_s": 0.2,
-        "m_B": 9.0,
-        "x_B": 0.9,
-        "z_B": -0.3,
-        "m_H": 1.0,
-        "x_H": 0.7,
-        "z_H": -0.3,
-    }
-    assert Values(tms, tms.sets[1], {n: exact(v) for n, v in p.items()})["Fr_c"] == 0
+    given = dict(zip(tms.sets[1].names, (0.7, 3.0, 9.81, 0.2, 9.0, 0.9, -0.3, 1.0, 0.7, -0.3), strict=True))
+    assert Values(tms, tms.sets[1], {n: exact(v) for n, v in given.items()})["Fr_c"] == 0
 
 
 ORACLE = {
@@ -96,18 +63,11 @@ ORACLE = {
     "text",
     [
         *(f"{name}(x)" for name in FUNCTIONS[:10]),
-        "min(x, y)",
         "max(x, y, 0.3)",
         "min(y, x, 2)",
-        "x**2 - y**-3",
-        "(-y)**3",
-        "y**0.5",
-        "2**x",
-        "y**x",
-        "x/3 + one/7",
-        "-pi*x",
-        "abs(x - y) - 0.1",
-        "3",
+        "(-x)**3 - x**-3",
+        "x**0.5*y**x",
+        "x/3 - pi*abs(x - y) + one/7",
     ],
 )
 def test_expressions_over_balls_enclose_the_60_digit_value(text):
@@ -119,7 +79,7 @@ def test_expressions_over_balls_enclose_the_60_digit_value(text):
         wanted = mp.mpf(eval(exactly, names))
         for convert in (exact, flint.arb):
             got = tree.of({"x": convert(x), "y": convert(y)}, BALLS)
-            assert abs(mp.mpf(middle(got).numerator) / middle(got).denominator - wanted) < mp.mpf(10) ** -45
+            assert abs(flint.arb(got) - flint.arb(mp.nstr(wanted, 60))) < flint.arb(10) ** -45
         got = tree.of({"x": series(x), "y": flint.arb(y)}, BALLS)
         slope = got[1] if isinstance(got, flint.arb_series) else flint.arb(0)
         step = mp.mpf(10) ** -15
@@ -127,7 +87,7 @@ def test_expressions_over_balls_enclose_the_60_digit_value(text):
         assert float(slope) == pytest.approx(float((up - down) / (2 * step)), rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("text", ["log(-x)", "sqrt(-x)", "asin(2*x)", "x/(y - y)", "(-x)**0.5", "(y - y)**-1"])
+@pytest.mark.parametrize("text", ["log(-x)", "asin(2*x)", "x/(y - y)", "(-x)**0.5"])
 def test_expressions_without_a_value_are_nan(text):
     got = parse_value(text, ["x", "y"]).of({"x": exact(0.7), "y": exact(1.9)}, BALLS)
     assert not flint.arb(got).is_finite()
@@ -137,26 +97,17 @@ def test_a_comparison_over_balls_is_left_minus_right():
     """A number has the value of all its digits, and a quotient of numbers is a fraction."""
     for text in ("0.1", "1/10", "0.1000", "1e-1", "0.30000000000000004444 - 0.20000000000000004444"):
         got = parse_comparison(f"x >= {text}", ["x"]).of({"x": exact(0.5)}, BALLS)
-        assert middle(got) == Fraction(1, 2) - Fraction(1, 10)
+        assert got == flint.fmpq(1, 2) - flint.fmpq(1, 10)
 
 
 def test_choices_and_magnitudes_of_balls():
     """Decided choices are exact, undecided ones enclose both cases, and floats and arrays keep their type."""
-    wide = flint.arb(0, 0.5)
-    assert ball_maximum(exact(2), exact(1)) == 2
-    assert ball_minimum(exact(2), flint.arb(3)) == 2
-    assert ball_maximum(wide, flint.arb(0)).contains(flint.arb(0.5))
-    assert magnitude(flint.arb_series([wide, 3], prec=2))[1].contains(flint.arb(-3))
-    assert magnitude(flint.arb_series([wide, 3], prec=2))[1].contains(flint.arb(3))
-    assert magnitude(series(-2.0))[1] == -1
-    assert positive_part(exact(-2)) == 0
-    assert positive_part(series(2.0))[1] == 1
-    assert ball_maximum(series(-2.0), flint.arb(1)) == 1
-    assert ball_minimum(flint.arb_series([wide, 1], prec=2), flint.arb(0))[1].contains(flint.arb(1))
-    assert absolute(-3.0) == 3
-    assert sqrt(exact(0.25)) == HALF
-    assert sqrt(exact(2)).contains(flint.arb(2).sqrt())
-    assert tan(exact(0)) == 0
-    assert BALLS.operations["pow"](exact(4), HALF) == 2
-    assert not flint.arb(quotient_or_nan(exact(1), exact(0))).is_finite()
-    np.testing.assert_array_equal(quotient_or_nan(np.array([1.0, 1.0]), np.array([2.0, 0.0])), [0.5, np.nan])
+    wide, slope = flint.arb(0, 0.5), flint.arb_series([flint.arb(0, 0.5), 3], prec=2)
+    assert kinds.ball_maximum(exact(2), exact(1)) == kinds.ball_minimum(exact(2), flint.arb(3)) == 2
+    assert kinds.ball_maximum(wide, flint.arb(0)).contains(flint.arb(0.5))
+    assert all(kinds.magnitude(slope)[1].contains(flint.arb(x)) for x in (-3, 3))
+    assert kinds.ball_minimum(slope, flint.arb(0))[1].contains(flint.arb(3))
+    assert (kinds.magnitude(series(-2.0))[1], kinds.positive_part(series(2.0))[1]) == (-1, 1)
+    assert kinds.ball_maximum(series(-2.0), flint.arb(1)) == 1
+    assert (kinds.sqrt(exact(0.25)), kinds.tan(exact(0)), BALLS.operations["pow"](exact(4), HALF)) == (HALF, 0, 2)
+    np.testing.assert_array_equal(kinds.quotient_or_nan(np.array([1.0, 1.0]), np.array([2.0, 0.0])), [0.5, np.nan])

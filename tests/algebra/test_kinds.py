@@ -113,11 +113,8 @@ def test_no_operation_is_left_out():
 
 def test_what_does_not_exist_is_nan_of_every_kind():
     x, y = symbol("x"), symbol("y")
-    own = formula(
-        [make_node("quotient_or_nan", x, y), make_node("quotient_or_zero", x, y), make_node("sqrt", -x)], ("x", "y")
-    )
-    at = {"x": 1.0, "y": 0.0}
-    s = ca.SX.sym("x", 2)
+    nodes = make_node("quotient_or_nan", x, y), make_node("quotient_or_zero", x, y), make_node("sqrt", -x)
+    own, at, s = formula(nodes, ("x", "y")), {"x": 1.0, "y": 0.0}, ca.SX.sym("x", 2)
     written = ca.Function("f", [s], [ca.vertcat(*values(own, {"x": s[0], "y": s[1]}))])
     assert np.isnan(np.array(values(own, at), dtype=float)).all()
     assert np.isnan(np.array(written([1.0, 0.0])).ravel()[[0, 2]]).all()
@@ -168,8 +165,7 @@ def test_what_is_certain_is_left_out():
         make_node("tan", make_node("atan", x)),
     ):
         assert same is x
-    assert zero.fraction == 0
-    assert (x - x).fraction == 0
+    assert zero.fraction == (x - x).fraction == 0
     assert formula([x * 0.0]).inputs == ("x",)  # which makes of infinity what is no number
     assert [step.op for step in formula([x * x, x**2, x**0.5]).steps] == ["input", "square", "sqrt"]
 

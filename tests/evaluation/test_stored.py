@@ -27,7 +27,7 @@ def stored_roots(found, coefficients=None):
     return list(roots_60([mp.mpf(1), *(mp.mpf(x) for x in coefficients or found.parameters.values())]))
 
 
-@pytest.mark.parametrize(("n", "decay"), [(2, 1.1), (3, 1.1), (4, 1.1), (4, 0.3), (5, 0.6)])
+@pytest.mark.parametrize(("n", "decay"), [(2, 1.1), (3, 1.1), (4, 0.3)])
 def test_a_multiple_root_on_a_limit_is_stored_left_of_it(n, decay):
     """(s + decay)ⁿ has the least coefficients; the nearest doubles have roots right of −decay by up to 1e-3."""
     found = least_sum(n, {"fast": f"abscissa <= {-decay}"})

@@ -46,25 +46,16 @@ def sampled(problem, design, quantity, steps):
 
 
 def some_designs(count, seed):
-    rng = np.random.default_rng(seed)
-    for _ in range(count):
-        yield {
-            "Fr": rng.uniform(0.5, 4),
-            "mu": rng.uniform(0.05, 3),
-            "chi_B": rng.uniform(0.9, 2),
-            "chi_H": rng.uniform(0.95, 1.2),
-            "zeta_B": rng.uniform(-1, -0.3),
-            "zeta_H": rng.uniform(-0.8, -0.2),
-            "lambda_s": rng.uniform(0.1, 1.1),
-        }
+    low, high = (0.5, 0.05, 0.9, 0.95, -1, -0.8, 0.1), (4, 3, 2, 1.2, -0.3, -0.2, 1.1)
+    for row in np.random.default_rng(seed).uniform(low, high, (count, 7)).tolist():
+        yield dict(zip(hunt.NATIVE, row, strict=True))
 
 
 VARIED = [
     # what varies, and how many steps of each a sample takes
-    ({"scenarios": {"Fr": Band(0.5, 4.0)}}, 8001),
     ({"scenarios": {"Fr": Band(0.5, 4.0), "mu": (0.1, 2.0)}}, 4001),
     ({"scenarios": {"Fr": Band(0.5, 4.0)}, "tolerances": {"chi_B": 0.05}}, 151),
-    ({"tolerances": {"chi_B": 0.05, "lambda_s": 0.05, "zeta_H": 0.05}}, 31),
+    ({"tolerances": {"chi_B": 0.05, "lambda_s": 0.05, "zeta_H": 0.05}}, 15),
     ({"scenarios": {"Fr": Band(1.0, 2.0)}, "tolerances": {"Fr": 0.1, "chi_H": 0.02}}, 31),
 ]
 
@@ -82,8 +73,7 @@ def test_worst_case_is_never_better_than_a_dense_sample(varied, steps):
             at = {**design, **case.at}
             at = {n: np.asarray(v + case.offset.get(n, 0.0)) for n, v in at.items()}
             assert float(quantity(at)) == pytest.approx(found[name].value, abs=1e-6)
-            for n, x in case.offset.items():
-                assert abs(x) <= problem.tolerances[n] * (1 + 1e-15)
+            assert all(abs(x) <= problem.tolerances[n] * (1 + 1e-15) for n, x in case.offset.items())
             for n, x in case.at.items():
                 band = problem.scenarios[n]
                 assert (band.min <= x <= band.max) if isinstance(band, Band) else x in band
@@ -109,8 +99,7 @@ def test_a_worst_case_on_an_edge_of_the_box_and_in_it():
 
 def test_an_infinite_root_is_the_worst_there_is():
     """a0 = 0 at T = (chi_H − 1)/zeta_H, inside the band: its roots go to infinity on one side of it."""
-    design = {**DESIGN, "chi_H": 0.98}
-    problem = fixed({**design}, scenarios={"lambda_s": [0.05, float(np.arctan(0.1)), 0.4]})
+    problem = fixed({**DESIGN, "chi_H": 0.98}, scenarios={"lambda_s": [0.05, float(np.arctan(0.1)), 0.4]})
     worst = worst_cases(problem)["abscissa"]
     assert worst.value > 1e6 or not np.isfinite(worst.value)
 
@@ -198,7 +187,7 @@ def test_a_problem_with_nothing_free_is_evaluated_at_its_worst():
     assert list(slow.violations) == ["fast"]
 
 
-@pytest.mark.parametrize("speeds", [(1.2, 1.9, 2.4), (1.8, 1.8001), (2.4, 2.39)])
+@pytest.mark.parametrize("speeds", [(1.2, 1.9, 2.4), (1.8, 1.8001)])
 def test_root_quantities_are_the_worst_of_the_cases(speeds):
     """Cases close together are told apart, although numeric roots alone would not be trusted to."""
     problem = fixed(scenarios={"Fr": speeds})

@@ -114,15 +114,6 @@ def is_stable_60(coefficients):
     return bool(abscissa_60(coefficients) < 0)
 
 
-def elementary(roots):
-    """Coefficients of the monic polynomial with these roots, at 60 digits."""
-    with mp.workdps(DIGITS + GUARD):
-        monic = [mp.mpc(1)]
-        for root in roots:
-            monic = _product(monic, (mp.mpc(1), -mp.mpmathify(root)))
-    return _at_60(monic)
-
-
 def weave_Fr_60(mu, chi_B, chi_H, zeta_B, zeta_H, lambda_s):
     """The Froude number at which the Hurwitz determinant of the 60-digit polynomial vanishes; None where it has no zero.
 

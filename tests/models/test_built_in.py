@@ -6,9 +6,13 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from tmsopt.models import MODELS, TAKEN
+from tmsopt.models import MODELS, TAKEN, controlled, tms, whipple
 
-pytestmark = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+LEAN, RATES = ("k_phi", "lean_phidot", "k_deltadot_v"), ("k_phidot", "lean_delta_v")
+CONTROLLED = [
+    controlled(model, gains) for model in (tms, whipple) for gains in (LEAN, (*RATES, "lag"), ("k_delta", "lag"))
+]
+pytestmark = pytest.mark.parametrize("model", [*MODELS.values(), *CONTROLLED], ids=lambda model: model.name)
 
 
 def test_no_name_means_two_things(model):

@@ -24,7 +24,7 @@ multiply_out = import_module("tmsopt.algebra.identity").multiply_out
 function = import_module("tmsopt.explorer.javascript").function
 pruning, translation = (import_module(f"tmsopt.global_search.{n}") for n in ("pruning", "translation"))
 
-POINTS, FEW = 1000, 20
+POINTS, FEW = 300, 20
 COUNTS = (FEW, pytest.param(POINTS, marks=[pytest.mark.slow, pytest.mark.long]))
 NOTHING = NLP("test", (), formula([0], ()), {}, (), (), (), (), ())
 SHORT = 60  # steps of what is multiplied out

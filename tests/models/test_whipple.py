@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import runpy
 from fractions import Fraction
 
@@ -11,13 +12,13 @@ import mpmath
 import numpy as np
 import pytest
 from helpers.bicycles import BENCHMARK, MATRICES, appendix, bicycles
-from helpers.designs import designs
+from helpers.oracles import ep4_of_heights
 from mpmath import mp
 
 import tmsopt
 from tmsopt import laws
 from tmsopt.dynamics import find_crossings
-from tmsopt.models import MODELS, Values, canonical, copo, problem_text, spin, to_si, whipple
+from tmsopt.models import MODELS, Values, canonical, copo, problem_text, spin, whipple
 from tmsopt.roots import exact_roots, quadratic_pencil
 
 SI = whipple.sets[0]
@@ -76,11 +77,8 @@ def test_weave_capsize_and_double_root_of_the_benchmark():
     assert weave.root.im == pytest.approx(3.43503384866144, abs=2e-14)
     assert capsize.at == pytest.approx(6.02426201538837, abs=2e-14)
     assert [c.changes for c in found.found] == [False, True, True]
-    assert found.stable == ((weave.at, capsize.at),)
-    assert found.heavily_damped == ()
-    assert found.weave == (weave.at,)
-    assert found.capsize == (capsize.at,)
-    assert found.exceptional == (double,)
+    assert (found.stable, found.heavily_damped) == (((weave.at, capsize.at),), ())
+    assert (found.weave, found.capsize, found.exceptional) == ((weave.at,), (capsize.at,), (double,))
 
 
 # The equations
@@ -115,41 +113,33 @@ def test_without_wheels_and_trail_it_is_tms_identically():
 
 def test_no_wheel_is_no_division():
     """S = I/r is 0 for a wheel that has no inertia, in every arithmetic, and nan for one that has but no radius."""
-    assert spin(0.0, 0.0) == spin(0.0, 0.3) == 0
+    for number in (float, flint.fmpq, flint.arb):
+        assert spin(number(0), number(0)) == 0
+        assert spin(number(3), number(2)) == number(3) / number(2)
     assert math.isnan(spin(0.1, 0.0))
-    np.testing.assert_array_equal(spin(np.array([0.0, 0.12]), np.array([0.0, 0.3])), [0.0, 0.12 / 0.3])
-    assert spin(flint.fmpq(0), flint.fmpq(0)) == 0
-    assert spin(flint.fmpq(1, 2), flint.fmpq(1, 4)) == 2
-    assert spin(flint.arb(0), flint.arb(0)) == 0
     assert not spin(flint.arb(1), flint.arb(0)).is_finite()
+    np.testing.assert_array_equal(spin(np.array([0.0, 0.12]), np.array([0.0, 0.3])), [0.0, 0.12 / 0.3])
     symbols = ca.SX.sym("I"), ca.SX.sym("r")
     function = ca.Function("S", symbols, [spin(*symbols), ca.jacobian(spin(*symbols), ca.vertcat(*symbols))])
     value, slopes = function(0, 0)
     assert float(value) == 0
     assert np.all(np.isfinite(np.array(slopes)))
-    assert float(function(0.12, 0.3)[0]) == pytest.approx(0.4, rel=1e-15)
-    for p in designs(3):
-        a = whipple.coefficients({n: flint.arb(x) for n, x in ({**NONE, **to_si(p)}).items()})
-        assert all(c.is_finite() for c in a)
 
 
-@pytest.mark.slow
-def test_a_problem_of_skates_is_one_of_whipple_word_for_word():
-    """What is left out is not there: the same SI names, the same EP4, in 1/s."""
-    fixed = {"w": 1.0, "m_B": 10.0, "z_B": -0.4, "m_H": 1.0, "x_H": 1.0, "z_H": -0.2}
-    free = {"v": (0.1, 10.0), "x_B": (1.01, 5.0), "lambda_s": (0.02, 1.4)}
-    design = tmsopt.solve(tmsopt.Problem(whipple, fixed=fixed, free=free, minimize="abscissa"))
-    law = laws.ep4_chi_H_1(-0.4, -0.2)
-    assert design.structure == "EP4"
-    assert design.bound.proven
-    assert design.value == pytest.approx(-(12.5**0.25) * math.sqrt(9.81), rel=1e-12)
-    assert design.parameters["x_B"] == pytest.approx(law.chi_B, rel=1e-12)
-    assert design.parameters["v"] == pytest.approx(law.Fr * math.sqrt(9.81), rel=1e-12)
-    assert design.quantities["m_ballast_rear"] == pytest.approx(10 * (math.sqrt(2) - 1), rel=1e-12)
-    names = set(design.quantities)
-    assert {"v_weave", "S_R"} <= names
-    moved = tmsopt.robustness(design).weights
-    assert set(moved) == {"w", "v", "lambda_s", "x_B", "z_B", "m_B", "x_H", "z_H", "m_H"}  # nothing that is not there
+def test_what_is_left_out_is_not_there():
+    """The nearest edge of stability moves nothing that is 0 by default."""
+    fixed = {
+        "w": 1.0,
+        "v": 7.0,
+        "lambda_s": 0.4,
+        "m_B": 10.0,
+        "x_B": 1.4,
+        "z_B": -0.4,
+        "m_H": 1.0,
+        "x_H": 1.02,
+        "z_H": -0.2,
+    }
+    assert set(tmsopt.nearest(tmsopt.Problem(whipple, fixed=fixed), "weave").direction) == set(fixed)
 
 
 # Quantities and speeds
@@ -167,33 +157,31 @@ def test_loads_are_the_moments():
 
 def test_speed_quantities_are_the_speeds_found():
     weaving = 0
-    for p in bicycles(12, seed=7):
+    for p in bicycles(7, seed=7):
         found = tmsopt.speeds(p, problem=tmsopt.Problem(whipple, fixed=p))
         values = Values(whipple, SI, p)
         least = min(found.weave, default=math.nan)
         assert values["v_weave"] == pytest.approx(least, rel=1e-9, nan_ok=True)
         assert values["v_capsize"] == pytest.approx(min(found.capsize, default=math.nan), rel=1e-9, nan_ok=True)
         weaving += math.isfinite(least)
-    assert 2 < weaving < 12
+    assert 1 < weaving < 7
 
 
 def test_no_speed_is_missed():
     """Along a fine grid, a change of stability or of the number of real roots stands at a speed that was found."""
-    grid = np.linspace(0.01, 25, 2001)
-    for p in bicycles(8, seed=8):
+    grid = np.linspace(0.01, 25, 801)
+    for p in bicycles(5, seed=8):
         found = tmsopt.speeds(p, problem=tmsopt.Problem(whipple, fixed=p))
-        a = np.stack(np.broadcast_arrays(*whipple.coefficients({**p, "v": grid})), axis=-1)
-        companion = np.zeros((len(grid), 4, 4)) + np.eye(4, k=-1)
-        companion[:, 0, :] = -a[:, 1:] / a[:, :1]
-        roots = np.linalg.eigvals(companion)
-        scale = np.abs(roots).max(axis=1)
-        for state in (roots.real.max(axis=1) < 0, np.sum(np.abs(roots.imag) > 1e-7 * scale[:, None], axis=1)):
+        roots = np.array(
+            [np.roots(a) for a in np.stack(np.broadcast_arrays(*whipple.coefficients({**p, "v": grid})), axis=-1)]
+        )
+        real, right = np.abs(roots.imag) <= 1e-7 * np.abs(roots).max(axis=1)[:, None], roots.real.max(axis=1)
+        for state in (right < 0, real.sum(axis=1)):
             for k in np.flatnonzero(state[1:] != state[:-1]):
                 step = grid[1] - grid[0]
                 assert any(grid[k] - step <= c.at <= grid[k + 1] + step for c in found.found)
         for low, high in found.stable:
-            inside = (grid > low) & (grid < high)
-            assert np.all(roots.real.max(axis=1)[inside] < 1e-9)
+            assert np.all(right[(grid > low) & (grid < high)] < 1e-9)
 
 
 def test_speeds_of_skates_are_those_of_the_paper():
@@ -343,18 +331,6 @@ def test_yaml_files_of_bicycle_parameters(tmp_path):
         tmsopt.read_bicycle(path)
 
 
-def test_the_skates_that_bicycle_parameters_has(tmp_path):
-    """Its file of the two-mass-skate bicycle has zero wheels; its critical speed is that of the closed form."""
-    names = "c rR mR IRxx IRyy IBxx IByy IBzz IBxz IHxx IHyy IHzz IHxz rF mF IFxx IFyy"
-    zero = "".join(f"{n} = 0.0\n" for n in names.split())
-    some = "w = 1.0\nlam = 0.0872664626\ng = 9.81\nxB = 1.2\nzB = -0.4\nmB = 10.0\nxH = 1.02\nzH = -0.2\nmH = 1.0\n"
-    (tmp_path / "TmsBenchmark.txt").write_text(zero + some)
-    bicycle = tmsopt.read_bicycle(tmp_path / "TmsBenchmark.txt")
-    values = Values(whipple, SI, {**bicycle.parameters, "v": 3.0})
-    expected = float(laws.Fr_c(0.1, 1.2, 1.02, -0.4, -0.2, 0.0872664626)) * math.sqrt(9.81)
-    assert values["v_weave"] == pytest.approx(expected, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [
@@ -373,6 +349,13 @@ def test_faults_of_a_parameter_file(tmp_path, old, new, line, words):
     fault = next(f for f in caught.value.faults if words in str(f))
     assert fault.file == str(path)
     assert fault.line == line
+
+
+def test_a_file_without_wheels_is_read(tmp_path):
+    """As the one that the program has of two-mass skates."""
+    path = tmp_path / "b.txt"
+    path.write_text(re.sub(r"(?m)^((?:[rm]|I)[RF]\w* = ).*", r"\g<1>0.0", FILE))
+    assert tmsopt.read_bicycle(path).parameters["r_F"] == 0
 
 
 def test_writing_needs_a_known_ending_and_every_parameter(tmp_path):
@@ -438,28 +421,19 @@ def unfold():
     flint.ctx.dps = digits
 
 
-@pytest.mark.parametrize(("name", "wheels", "trail"), [("wheels", 1, 0), ("trail", 0, 1), ("both", 1, 1)])
-def test_ep4_unfolds_by_the_fourth_root(unfold, name, wheels, trail):
+@pytest.mark.parametrize(("wheels", "trail"), [(1, 0), (0, 1)])
+def test_ep4_unfolds_by_the_fourth_root(unfold, wheels, trail):
     """p(r + σ) = a0 σ⁴ + ε q: the four roots stand at (−ε q/a0)^(1/4), q by the paper's matrices at 60 digits."""
     with mp.workdps(60):
-        root2, g, step = mp.sqrt(2), mp.mpf("9.81"), mp.mpf(10) ** -30
-        T, v = mp.mpf(15) / 4 - 75 * root2 / 32, 3 * mp.sqrt(110 * root2 - 120) / 8 * mp.sqrt(g)
-        r = -(mp.mpf("12.5") ** mp.mpf("0.25")) * mp.sqrt(g)
-        p = dict.fromkeys(SI.names, mp.mpf(0)) | {
-            "w": mp.mpf(1),
-            "g": g,
-            "v": v,
-            "m_B": mp.mpf(10),
-            "z_B": mp.mpf("-0.4"),
-            "x_B": root2,
-            "m_H": mp.mpf(1),
-            "x_H": mp.mpf(1),
-            "z_H": mp.mpf("-0.2"),
-        }
+        g, step = mp.mpf("9.81"), mp.mpf(10) ** -30
+        own = {"w": 1, "g": g, "m_B": 10, "z_B": mp.mpf("-0.4"), "m_H": 1, "x_H": 1, "z_H": mp.mpf("-0.2")}
+        at = ep4_of_heights(own["z_B"], own["z_H"])
+        r = at["r"] * mp.sqrt(g)
+        p = dict.fromkeys(SI.names, mp.mpf(0)) | own | {"v": at["Fr"] * mp.sqrt(g), "x_B": at["chi_B"]}
         radius = mp.mpf("0.3") * step * wheels or mp.mpf(10) ** -50  # the appendix divides by it
         for k in "RF":
             p |= {f"r_{k}": radius, f"m_{k}": mp.mpf(1), f"I_{k}xx": radius**2 / 2, f"I_{k}yy": radius**2}
-        a = polynomial_of({**p, "c": mp.mpf("0.05") * step * trail}, T)
+        a = polynomial_of({**p, "c": mp.mpf("0.05") * step * trail}, at["T"])
         q = float(mpmath.polyval(a, r) / a[0] / step)
     assert unfold["first_order"](wheels, trail)[0] == pytest.approx(q, rel=1e-9)
     for exponent in (16, 20):
@@ -473,10 +447,8 @@ def test_ep4_unfolds_by_the_fourth_root(unfold, name, wheels, trail):
 def test_the_trail_that_holds_ep4_leaves_by_the_third_root(unfold):
     """With p(r) held to first order: σ⁴ + ε q₁ σ = 0, so three roots at (−ε q₁)^(1/3)."""
     held = flint.fmpq(*float(unfold["held_trail"]()).as_integer_ratio())
-    last, slope = unfold["first_order"](1, held)
-    assert abs(last) < 1e-6 * abs(unfold["first_order"](1, 0)[0])
-    moved = unfold["displacements"](flint.fmpq(1, 10**9), 1, held)
-    expected = np.roots([1, 0, 0, slope * 1e-9])
+    _, slope = unfold["first_order"](1, held)
+    moved, expected = unfold["displacements"](flint.fmpq(1, 10**9), 1, held), np.roots([1, 0, 0, slope * 1e-9])
     assert all(np.abs(moved - z).min() < 0.05 * abs(z) for z in expected)
     assert np.abs(moved).min() < 0.1 * np.abs(expected).min()
 
@@ -507,14 +479,12 @@ def test_speeds_command(run):
     assert run("speeds", "problems/chart.toml")[0] == 2
 
 
-def test_report_of_a_whipple_bicycle(tmp_path, run):
-    path = tmp_path / "growth.png"
-    code, out, _ = run("solve", "problems/whipple_benchmark.toml", "--full", "--plot", path)
+def test_report_of_a_whipple_bicycle(run):
+    code, out, _ = run("solve", "problems/whipple_benchmark.toml")
     assert code == 0
-    for words in ("; stands on both wheels", "v_capsize         6.02426201539", "1/s", "I_Hxz"):
+    for words in ("; stands on both wheels", "from 4.2924 to 6.0243 m/s", "1/s"):
         assert words in out
     assert "dimensionless" not in out
-    assert path.stat().st_size > 10_000
 
 
 def test_import_command(tmp_path, run):

@@ -133,11 +133,11 @@ def test_a_file_with_anything_left_out_is_answered_in_words(tmp_path):
     text = ROBOT.replace("LIMIT", "abs(u_H - 2*v) >= 0.02").replace('"robot"', '"""\na\n"""')
     assert load(tmp_path, text).constraints
     refused = 0
-    for size in (1, 3, 9):
+    for size in (2, 9):
         for start in range(0, len(text), size):
             try:
                 load(tmp_path, text[:start] + text[start + size :])
             except tmsopt.InputError as error:
                 refused += 1
                 assert all(fault.line >= 1 and fault.message for fault in error.faults)
-    assert refused > 100
+    assert refused > 60

@@ -3,15 +3,13 @@
 import dataclasses
 import math
 from importlib import import_module
-from itertools import product
 
 import casadi as ca
-import mpmath
 import numpy as np
 import pytest
 
 from benchmarks.suites import TEMPLATES
-from tmsopt.algebra import UnsupportedOperation, evaluate_on_arrays, from_casadi
+from tmsopt.algebra import evaluate_on_arrays, from_casadi
 from tmsopt.errors import InputError
 from tmsopt.models import Quantity, Values, from_coefficients, tms
 from tmsopt.problem import NO_RADIUS, Problem, array_function, parse_comparison
@@ -42,54 +40,6 @@ def grid(problem, rows=7, columns=11):
 def single(problem, columns, i, j, shape=(7, 11)):
     """One design of a grid as numbers."""
     return {n: float(np.broadcast_to(v, shape)[i, j]) for n, v in columns.items()}
-
-
-# What an expression is
-
-
-OPERATIONS = [
-    "Fr + lambda_s",
-    "Fr - lambda_s",
-    "Fr * lambda_s",
-    "Fr / lambda_s",
-    "-Fr",
-    "Fr ** 2",
-    "Fr ** 3",
-    "lambda_s ** 4",
-    "Fr ** -1",
-    "Fr ** 0.5",
-    "Fr ** 1.7",
-    "Fr ** lambda_s",
-    "2 ** lambda_s",
-    "sin(Fr)",
-    "cos(Fr)",
-    "tan(Fr)",
-    "asin(lambda_s / 2)",
-    "acos(lambda_s / 2)",
-    "atan(lambda_s)",
-    "sqrt(Fr)",
-    "exp(lambda_s)",
-    "log(Fr)",
-    "abs(lambda_s)",
-    "min(Fr, lambda_s, 1)",
-    "max(Fr, lambda_s, 1)",
-    "pi * Fr",
-]
-"""One each, so that an error is that of the operation; division of an angle by 2 is exact."""
-
-FUNCTIONS = {n: getattr(mpmath, n) for n in ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "exp", "log")}
-
-
-def test_every_operation_of_the_language_is_right():
-    """A correctly rounded operation is within 1/2 ulp, NumPy's functions within 2, as its own tests demand."""
-    columns = grid(NATIVE)
-    values = array_function(NATIVE.posed, {text: text for text in OPERATIONS})(columns)
-    with mpmath.workdps(50):
-        for text, (i, j) in product(OPERATIONS, np.ndindex(7, 11)):
-            design = {n: mpmath.mpf(x) for n, x in single(NATIVE, columns, i, j).items()}
-            wanted = eval(text, {**FUNCTIONS, "pi": mpmath.mpf(math.pi)}, design)
-            found = mpmath.mpf(float(np.broadcast_to(values[text], (7, 11))[i, j]))
-            assert abs(found - wanted) <= 2 * math.ulp(float(wanted)), text
 
 
 @pytest.mark.parametrize("problem", [NATIVE, SI], ids=["native", "SI"])
@@ -189,15 +139,11 @@ def test_a_formula_that_asks_for_its_numbers_is_refused_in_words():
 # Programs
 
 
-@pytest.mark.parametrize("size", [5, 97])
-def test_blocks_change_nothing(size, monkeypatch):
-    """Blocks are parts of a row, or some rows."""
-    written, columns = (
-        array_function(NATIVE.posed, {n: n for n in ("a2", "a4", "Fr_c", "ballast_rear")}),
-        grid(NATIVE, 40, 30),
-    )
+def test_blocks_change_nothing(monkeypatch):
+    """Blocks are parts of a row."""
+    written, columns = array_function(NATIVE.posed, {n: n for n in ("a2", "a4", "Fr_c")}), grid(NATIVE, 40, 30)
     whole = written(columns)
-    monkeypatch.setattr(arrays, "BLOCK", size)
+    monkeypatch.setattr(arrays, "BLOCK", 5)
     for name, part in written(columns).items():
         np.testing.assert_allclose(part, whole[name], rtol=1e-12)
 
@@ -211,12 +157,6 @@ def test_inputs_are_left_as_they_are_and_may_be_read_only():
     values = found(columns | {"abscissa": alpha})
     assert np.array_equal(values["x"], alpha * columns["Fr"] - columns["lambda_s"])
     assert np.array_equal(values["y"], alpha)
-
-
-def test_an_operation_that_arrays_lack_is_refused():
-    x = ca.SX.sym("x")
-    with pytest.raises(UnsupportedOperation, match="erf"):
-        evaluate_on_arrays(from_casadi(ca.Function("f", [x], [ca.erf(x)])), {"0": 3.0})
 
 
 def test_an_empty_output_is_zero():

@@ -113,12 +113,8 @@ def test_an_empty_table_is_no_controller(tmp_path):
 GAINS = {
     "k_fi = 3": ": unknown gain 'k_fi'; did you mean 'k_phi'?",
     "kappa_phi = 3": ": unknown gain 'kappa_phi'",
-    "k_phi = { min = 9, max = 1 }": ": min = 9 is greater than max = 1",
     "k_phi = nan": ": found nan; accepted: a finite number in N m/rad",
-    "k_phi = { min = -inf, max = 1 }": ".min: found -inf",
     'k_phi = "20 N m"': ": found the unit 'N m', which is not known or not",
-    "k_phi = true": ": found True; accepted: a number",
-    "k_phi = { min = 1 }": ".max: missing max of k_phi",
     "k_phi = { min = 1, max = 2, start = 5 }": ".start: start = 5 lies",
     "lag = 0": ": lag = 0 s is not physical",
     'lag = "5 kg"': ": found the unit 'kg', which is not known or not a unit of s",
@@ -250,29 +246,28 @@ def test_results_are_written_for_every_kind(kind, tmp_path):
     written = re.search(r"^const DATA = (.*);$", page_of(design), re.MULTILINE)
     assert written is not None
     data = json.loads(written[1])
+<<<<<<< HEAD
     assert data["bicycle"]  # it is drawn
     assert [known["name"] for known in data["designs"]] == ["optimum", "benchmark"]
+=======
+    assert data["bicycle"] == problem.model.name  # it is drawn
+    assert {*data["designs"][1]["values"]} >= {0.0}  # the benchmark, without a controller
+>>>>>>> e44e953d53678fe85607b13c985d2750a370089c
     values = dict(zip(problem.posed.parameter_set.names, data["designs"][0]["values"], strict=True))
     lines = "".join(f"{name} = {value!r}\n" for name, value in values.items())
     again = tmsopt.solve(load(tmp_path, data["toml"]["before"] + lines + data["toml"]["after"]))
     assert again.abscissa_realised == design.abscissa_realised
-    benchmark = dict(zip(problem.posed.parameter_set.names, data["designs"][1]["values"], strict=True))
-    assert {benchmark[n] for n in problem.free} == {0.0}  # without a controller
 
 
-@pytest.mark.parametrize("kind", ["wheels", "lag"])
-def test_speeds_are_those_of_a_grid_of_eigenvalues(kind, tmp_path):
-    design = tmsopt.solve(problems(tmp_path)[kind])
+@pytest.mark.parametrize("lag", ["", 'lag = "50 ms"\n'])
+def test_speeds_are_those_of_a_grid_of_eigenvalues(lag, tmp_path):
+    design = tmsopt.solve(load(tmp_path, WHEELS.replace(OBJECTIVE, lag + OBJECTIVE)))
     found = tmsopt.speeds(design)
-    names = tmsopt.models.whipple.sets[0].names
-    robot = tmsopt.Problem(design.problem.model, fixed=design.parameters)
     for v in np.linspace(0.2, 10, 50):
         if all(abs(v - c.at) > 0.02 for c in found.found):
-            inside = any(low <= v <= high for low, high in found.stable)
-            k = {n: x for n, x in design.parameters.items() if n not in names and n != "lag"}
-            values = robot.model.coefficients({**design.parameters, "v": v}) if kind == "lag" else None
-            largest = abscissa(v, k) if values is None else float(np.roots(values).real.max())
-            assert (largest < 0) == inside
+            largest = np.roots(design.problem.model.coefficients({**design.parameters, "v": v})).real.max()
+            assert (largest < 0) == any(low <= v <= high for low, high in found.stable)
+            assert lag or largest == pytest.approx(abscissa(v, design.parameters), rel=1e-6)
 
 
 @pytest.mark.slow

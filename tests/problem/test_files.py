@@ -89,28 +89,20 @@ BAD = {
     "start outside": ("start = 2", "start = 20", 10, ["start", "20", "0.01", "10"]),
     "wrong unit": ('"1 deg"', '"1 kg"', 11, ["kg", "deg"]),
     "unit on a dimensionless number": ("mu = 0.1", 'mu = "0.1 kg"', 8, ["0.1 kg", "dimensionless"]),
-    "malformed unit": ('"1 deg"', '"1 d*/g"', 11, ["d*/g"]),
     "not physical": ("zeta_B = -0.4", "zeta_B = 0.4", 7, ["zeta_B", "0.4", "<= 0"]),
     "tilt beyond 90 degrees": ('"80 deg"', '"95 deg"', 11, ["lambda_s", "1.5708"]),
     "nan": ("mu = 0.1", "mu = nan", 8, ["nan", "finite"]),
-    "infinity": ("max = 5", "max = inf", 9, ["inf", "finite"]),
-    "boolean": ("mu = 0.1", "mu = true", 8, ["True", "number"]),
-    "list": ("mu = 0.1", "mu = [1]", 8, ["[1]", "number"]),
     "mixed sets": ("mu = 0.1", "mu = 0.1\nm_B = 10", 9, ["m_B", "SI", "do not mix"]),
     "both objectives": ('"abscissa"', '"abscissa"\nmaximize = "Fr"', 13, ["minimize and maximize"]),
     "no objective": ('minimize = "abscissa"\n', "", 13, ["minimize, maximize or locate"]),
     "unknown pattern": ('minimize = "abscissa"', 'locate = "EP5"', 14, ["EP5", "EP4"]),
     "objective does not parse": ('"abscissa"', '"abscissa +"', 14, ["abscissa +", "does not parse"]),
     "unknown name": ("nu_H >=", "nuh >=", 17, ["nuh", "did you mean 'nu_H'"]),
-    "call": ("nu_H >= 0.02", "__import__('os') >= 0", 17, ["__import__"]),
-    "attribute": ("nu_H >= 0.02", "nu_H.real >= 0", 17, ["attribute"]),
     "not a comparison": ("nu_H >= 0.02", "nu_H", 17, ["not a comparison", ">="]),
     "constraint is a number": ('"nu_H >= 0.02"', "3", 17, ["3", "quotes"]),
-    "title is a number": ('"EP4 of the chi_H = 1 bicycle"', "4", 1, ["title", "4"]),
     "parameters is a number": (GOOD, "parameters = 3\n", 1, ["parameters", "3"]),
     "no parameters": (GOOD, 'title = "x"\n', 1, ["parameters", "missing"]),
     "not TOML": ("mu = 0.1", "mu = = 0.1", 8, ["not TOML"]),
-    "duplicate key": ("mu = 0.1", "mu = 0.1\nmu = 0.2", 9, ["not TOML"]),
 }
 
 
@@ -133,13 +125,6 @@ def test_all_faults_of_a_file_at_once(write):
     with pytest.raises(tmsopt.InputError) as caught:
         tmsopt.load(write(text))
     assert [f.line for f in caught.value.faults] == [7, 8, 17]
-
-
-def test_same_faults_from_python():
-    with pytest.raises(tmsopt.InputError, match="did you mean 'chi_B'"):
-        tmsopt.Problem(tmsopt.models.tms, fixed={"chi_b": 1.0}, minimize="abscissa")
-    with pytest.raises(tmsopt.InputError, match="swap"):
-        tmsopt.Problem(tmsopt.models.tms, free={"Fr": (2, 1)}, minimize="abscissa")
 
 
 UNREADABLE = {
@@ -165,12 +150,6 @@ def test_missing_file_suggests_a_neighbour(write):
     path = write(GOOD)
     with pytest.raises(tmsopt.InputError, match=r"did you mean 'problem\.toml'"):
         tmsopt.load(path.with_name("problm.toml"))
-
-
-def test_minimum_equal_to_maximum_fixes(write):
-    problem = tmsopt.load(write(GOOD.replace("max = 5", "max = 1.01")))
-    assert problem.fixed["chi_B"] == 1.01
-    assert "chi_B" not in problem.free
 
 
 @pytest.mark.parametrize("path", sorted(set(Path("problems").glob("*.toml")) - STUDIES), ids=lambda p: p.stem)

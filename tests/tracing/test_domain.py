@@ -69,11 +69,7 @@ EVERY = PLANES | {
 
 
 def native(values):
-    if "w" not in values:
-        return values
-    lengths = {f"{n}_{k}": values[f"{s}_{k}"] / values["w"] for n, s in (("chi", "x"), ("zeta", "z")) for k in "BH"}
-    speed = values["v"] / math.sqrt(values["g"] * values["w"])
-    return lengths | {"Fr": speed, "mu": values["m_H"] / values["m_B"], "lambda_s": values["lambda_s"]}
+    return tms.sets[1].native(values) if "w" in values else values
 
 
 class Plane:
@@ -137,7 +133,7 @@ def test_every_change_along_random_lines_lies_on_an_arc(planes, name):
         arcs = plane.arcs(which)
         middles = [arc[len(arc) // 2] for arc in arcs] or [np.array([0.5, 0.5])]
         found = 0
-        for number in range(5):
+        for number in range(4):
             begin, end = rng.random(2), rng.random(2)
             if number >= 2:  # small domains are missed by most lines: aim at them
                 begin = np.clip(middles[number % len(middles)] + rng.uniform(-0.15, 0.15, 2), 0, 1)
@@ -259,15 +255,6 @@ def test_a_root_through_infinity_bounds_heavy_damping():
     assert damped(plane.polynomial(edge + away))  # so it is: exact
     assert not damped(plane.polynomial(edge - away))
     assert distance(edge, plane.arcs("heavy_damping")) <= 1e-5
-
-
-def test_the_untilted_axis_bounds_stability_at_chi_H_1():
-    plane = Plane(BASE | {"Fr": FR_EP4 + 0.5}, {"chi_B": (1.1, 1.9), "lambda_s": (-0.5, 0.5)}, starts=8)
-    edge = plane.unit({"chi_B": 1.6, "lambda_s": 0.0})
-    up = np.array([0.0, 1e-6])
-    assert stable(plane.polynomial(edge + up))
-    assert not stable(plane.polynomial(edge - up))
-    assert distance(edge, plane.arcs("stability")) <= 1e-5
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -16,7 +16,7 @@ EP_SET = Problem(
     free={"Fr": (0.5, 5.0), "chi_B": (1.01, 3.0), "lambda_s": (0.02, 1.48)},
     locate="2EP2",
 )
-FEW = {"starts": 4}
+FEW = {"starts": 2, "step": 0.02}
 EXACT = 1e-12
 """Some roundings, times the slope of the curve."""
 
@@ -78,19 +78,20 @@ def test_a_function_may_use_quantities_and_unknowns_of_the_pattern():
 def test_two_zeros_within_a_step_are_two_events():
     """lambda_s − 0.5 = ±1e-4, a fiftieth of a step."""
     near = Event("near", lambda p: (p["lambda_s"] - 0.5) ** 2 - 1e-8)
-    angles = [e.parameters["lambda_s"] for e in by_name(traced(near), "near")]
+    angles = [e.parameters["lambda_s"] for e in by_name(tmsopt.trace(EP_SET, events=[near], starts=2), "near")]
     assert sorted(angles) == pytest.approx([0.5 - 1e-4, 0.5 + 1e-4], abs=1e-10)
 
 
 def test_text_json_csv_and_pictures_have_them(tmp_path):
-    found = traced(Event("slow", HALF.function, detail="on purpose"))
+    noted = "on purpose, stability changes"  # which weave and capsize say of theirs; it decides nothing
+    found = traced(Event("slow", HALF.function, detail=noted))
+    assert by_name(found, "slow")[0].parameters["lambda_s"] == pytest.approx(0.5, abs=EXACT)
     assert "slow" in str(found)
     assert "on purpose" in str(found)
     data = json.loads(json.dumps(found.to_json()))
-    assert ("slow", "on purpose") in [(e["name"], e["detail"]) for e in data["branches"][0]["events"]]
-    assert set(data["branches"][0]["events"][0]) == {"name", "detail", "index", "parameters"}
+    assert ("slow", noted) in [(e["name"], e["detail"]) for e in data["branches"][0]["events"]]
     found.write_csv(tmp_path / "curve.csv")
-    assert "slow: on purpose" in (tmp_path / "curve.csv").read_text(encoding="utf-8")
+    assert f"slow: {noted}" in (tmp_path / "curve.csv").read_text(encoding="utf-8")
     assert "slow" in [text.get_text() for text in found.plot().texts]
 
 
@@ -160,18 +161,12 @@ def test_what_is_no_event_is_refused(events, words):
             verb(EP_SET, events=events)
 
 
-def test_the_detail_of_an_event_decides_nothing():
-    noted = Event("half", HALF.function, detail="stability changes")  # which weave and capsize say of theirs
-    (found,) = by_name(traced(noted), "half")
-    assert found.parameters["lambda_s"] == pytest.approx(0.5, abs=EXACT)
-
-
 # By hand
 
 
 def test_points_lie_on_the_curve_and_their_tangents_along_it():
-    points = list(tmsopt.continue_from(EP_SET, step=0.01))
-    assert len(points) > 50
+    points = list(tmsopt.continue_from(EP_SET, step=0.02))
+    assert len(points) > 20
     for point in points:
         assert point.parameters["Fr"] == pytest.approx(law(point.parameters["lambda_s"]), abs=EXACT)
     lengths = np.diff([p.arclength for p in points])
@@ -185,21 +180,21 @@ def test_points_lie_on_the_curve_and_their_tangents_along_it():
 
 def test_points_and_events_are_those_of_the_trace():
     (branch,) = traced(HALF).branches
-    curve = tmsopt.continue_from(EP_SET, events=[HALF])
-    named = {name: p for p in curve for name in p.events}
-    assert curve.end == "Fr.max"
-    curve.reverse()
-    named |= {name: p for p in curve for name in p.events}
-    assert curve.end == "Fr.max"
+    curve = tmsopt.continue_from(EP_SET, events=[HALF], step=0.02)
+    named = {}
+    for _ in range(2):
+        named |= {name: p for p in curve for name in p.events}
+        assert curve.end == "Fr.max"
+        curve.reverse()
     assert set(named) == {"EP4", "fold", HALF.name}
     for event in (e for e in branch.events if e.name != "end"):
         assert dict(named[event.name].parameters) == pytest.approx(dict(event.parameters), abs=1e-9)
 
 
 def test_a_consumer_stops_and_goes_on():
-    curve = tmsopt.continue_from(EP_SET, through={"Fr": law(0.3), "chi_B": math.sqrt(2), "lambda_s": 0.3}, step=0.002)
+    curve = tmsopt.continue_from(EP_SET, through={"Fr": law(0.3), "chi_B": math.sqrt(2), "lambda_s": 0.3}, step=0.01)
     first = next(curve)
-    assert first.parameters["lambda_s"] == pytest.approx(0.3, abs=0.01)
+    assert first.parameters["lambda_s"] == pytest.approx(0.3, abs=0.05)
     if first.tangent["lambda_s"] < 0:
         curve.reverse()
     for point in curve:
@@ -211,8 +206,8 @@ def test_a_consumer_stops_and_goes_on():
 
 
 def test_reverse_goes_back_over_the_same_curve():
-    curve = tmsopt.continue_from(EP_SET, step=0.005, events=[FAST])
-    ahead = [next(curve) for _ in range(30)]
+    curve = tmsopt.continue_from(EP_SET, step=0.02, events=[FAST])
+    ahead = [next(curve) for _ in range(10)]
     curve.reverse()
     back = next(curve)
     assert back.arclength < ahead[-1].arclength
@@ -226,7 +221,7 @@ def test_reverse_goes_back_over_the_same_curve():
 
 
 def test_turning_round_at_an_event_does_not_find_it_again():
-    curve = tmsopt.continue_from(EP_SET, events=[FAST])
+    curve = tmsopt.continue_from(EP_SET, events=[FAST], step=0.02)
     for point in curve:
         if "Fr is 3" in point.events:
             break
@@ -237,7 +232,7 @@ def test_turning_round_at_an_event_does_not_find_it_again():
 
 
 def test_an_event_that_stops_is_the_last_point_and_one_can_turn_round():
-    curve = tmsopt.continue_from(EP_SET, events=[Event("Fr is 3", FAST.function, stop=True)])
+    curve = tmsopt.continue_from(EP_SET, events=[Event("Fr is 3", FAST.function, stop=True)], step=0.02)
     ahead = list(curve)
     assert curve.end == "Fr is 3"
     assert ahead[-1].events == ("Fr is 3",)
@@ -251,7 +246,7 @@ def test_an_event_that_stops_is_the_last_point_and_one_can_turn_round():
 
 
 def test_a_closed_curve_ends_where_it_began():
-    curve = tmsopt.continue_from(circle(), step=0.01)
+    curve = tmsopt.continue_from(circle(), step=0.02)
     points = list(curve)
     assert curve.end == "closed"
     assert dict(points[-1].parameters) == dict(points[0].parameters)

@@ -1,6 +1,5 @@
-"""Traced patterns and domains of models of any degree against closed forms, exact arithmetic and winding numbers."""
+"""Traced patterns and domains of models of any degree against closed forms, exact arithmetic and eigenvalues."""
 
-import json
 import math
 from fractions import Fraction
 from itertools import pairwise
@@ -9,15 +8,12 @@ from math import comb
 import casadi as ca
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from helpers.oracles import discriminant_exact
 
 from tmsopt.analysis import optimality
-from tmsopt.cli import command_group as main
 from tmsopt.errors import InputError
-from tmsopt.models import from_coefficients, from_matrices, whipple
-from tmsopt.plots import trace_figure
-from tmsopt.problem import Problem, load
+from tmsopt.models import from_coefficients, from_matrices
+from tmsopt.problem import Problem
 from tmsopt.roots import product, shift
 from tmsopt.roots.patterns import describe_structure
 from tmsopt.search import solve
@@ -65,12 +61,13 @@ def dimer(beside):
     return from_matrices(A=rows, name="dimer")
 
 
-def chain(unit=1.0):
+def chain(unit=1):
     """Three oscillators in a row; `unit` is what a second is in units of time."""
-    c1, c2, c3, k1, k2, k3, q = symbols("c1 c2 c3 k1 k2 k3 q")
-    D = [[c1, 0, 0], [0, c2, 0], [0, 0, c3]]
-    K = [[k1 + q, -q, 0], [-q, k2 + 2 * q, -q], [0, -q, k3 + q]]
-    scaled = ([[x * f for x in row] for row in m] for m, f in ((D, unit), (K, unit**2)))
+    D, K = (
+        [["c1", 0, 0], [0, "c2", 0], [0, 0, "c3"]],
+        [["k1 + q", "-q", 0], ["-q", "k2 + 2*q", "-q"], [0, "-q", "k3 + q"]],
+    )
+    scaled = ([[f"({x})*{f}" for x in row] for row in m] for m, f in ((D, unit), (K, unit**2)))
     return from_matrices([[1, 0, 0], [0, 1, 0], [0, 0, 1]], *scaled, name="three oscillators")
 
 
@@ -113,17 +110,14 @@ def test_two_oscillators_meet_in_a_complex_and_then_in_a_real_root():
 
 def test_a_complex_exceptional_point_beside_another_mode():
     """Degree 6: the pair is −(g1 + g2)/2 ± i w, the rest s² + 0.4 s + 9.04."""
-    model = dimer([[-0.2, -3.0], [3.0, -0.2]])
     free = {"g1": (0.2, 1.5), "q": (0.01, 1.0), "w2": (0.5, 2.0)}
-    branch = only(traced(model, "CEP2", free, {"g2": 0.1, "w1": 1.0}))
-    p, u = branch.parameters, branch.unknowns
-    assert p["w2"] == pytest.approx(np.ones(len(branch)), abs=EXACT)
-    assert p["q"] == pytest.approx((p["g1"] - 0.1) / 2, abs=EXACT)
+    branch = only(traced(dimer([[-0.2, -3.0], [3.0, -0.2]]), "CEP2", free, {"g2": 0.1, "w1": 1.0}))
+    p, u, one = branch.parameters, branch.unknowns, np.ones(len(branch))
+    rate = (p["g1"] + 0.1) / 2
+    found = np.stack([p["w2"], p["q"], u["b"], u["c"], u["d1"], u["d2"]])
+    assert found == pytest.approx(np.stack([one, rate - 0.1, 2 * rate, rate**2 + 1, 0.4 * one, 9.04 * one]), abs=EXACT)
+    assert branch.abscissa == pytest.approx(np.maximum(-rate, -0.2), abs=EXACT)
     assert np.ptp(p["g1"]) == pytest.approx(1.3, abs=EXACT)
-    assert u["b"] == pytest.approx(p["g1"] + 0.1, abs=EXACT)
-    assert u["c"] == pytest.approx((p["g1"] + 0.1) ** 2 / 4 + 1, abs=EXACT)
-    assert np.stack([u["d1"], u["d2"]]) == pytest.approx(np.array([[0.4], [9.04]]) * np.ones(len(branch)), abs=EXACT)
-    assert branch.abscissa == pytest.approx(np.maximum(-(p["g1"] + 0.1) / 2, -0.2), abs=EXACT)
     assert set(branch.kinds) == {"CEP2"}
 
 
@@ -138,7 +132,7 @@ def test_several_patterns_at_once():
     assert branch.parameters["w2"] == pytest.approx(np.ones(len(branch)), abs=EXACT)
 
 
-@pytest.mark.parametrize(("degree", "rate"), [(3, 1.0), (5, 1e-3), (12, 1.0), (12, 100.0)])
+@pytest.mark.parametrize(("degree", "rate"), [(3, 1.0), (12, 100.0)])
 def test_a_root_of_full_multiplicity(degree, rate):
     """Its coefficients are C(n, k) (−r)ᵏ: in degree 12 and a unit of time of 10 ms they reach from 1 to 4e27."""
     names = [f"x{k}" for k in range(1, degree + 1)]
@@ -196,7 +190,7 @@ def test_no_branch_is_missed_where_the_exact_discriminant_changes_sign(real_pair
 
 def test_the_unit_of_time_does_not_matter(real_pairs):
     """The same chain with 1 ms for 1 s: the same curves, events and shares, with roots 1000 times as large."""
-    slow, fast = real_pairs, traced(chain(1000.0), "EP2", PLANE, CHAIN)
+    slow, fast = real_pairs, traced(chain(1000), "EP2", PLANE, CHAIN)
     assert len(slow.branches) == len(fast.branches)
     for a, b in zip(slow.branches, fast.branches, strict=True):
         assert [(e.name, e.detail) for e in a.events] in (
@@ -209,13 +203,6 @@ def test_the_unit_of_time_does_not_matter(real_pairs):
         assert b.residual <= 1e-13
 
 
-def winding(a):
-    """Roots with Re s > 0 by the argument of p along the imaginary axis, which turns by π for each on the left."""
-    w = np.tan(np.linspace(-1, 1, 40001) * (math.pi / 2 - 1e-6))
-    turned = np.unwrap(np.angle(np.polyval(a, 1j * w)))[[0, -1]]
-    return round((len(a) - 1 - (turned[1] - turned[0]) / math.pi) / 2)
-
-
 def test_across_a_weave_curve_two_roots_change_sides_and_none_elsewhere():
     fixed = {"c1": -0.1, "c2": 0.3, "k1": 1.0, "k2": 1.2, "k3": 0.8}
     free = {"c3": (-1.0, 1.0), "q": (0.001, 2.0)}
@@ -224,7 +211,7 @@ def test_across_a_weave_curve_two_roots_change_sides_and_none_elsewhere():
     assert len(found.branches) == 2
 
     def count(c3, q):
-        return winding([float(x) for x in model.coefficients({**fixed, "c3": c3, "q": q})])
+        return (np.roots(model.coefficients({**fixed, "c3": c3, "q": q})).real > 0).sum()
 
     for branch in found.branches:
         for k in range(5, len(branch) - 5, 40):
@@ -237,13 +224,6 @@ def test_across_a_weave_curve_two_roots_change_sides_and_none_elsewhere():
 
 
 # Higher points on curves, and the domain
-
-
-def test_a_section_through_an_ep4_beside_other_roots_has_it_as_an_event():
-    found = traced(unfolded([1, 7]), "EP2", {"y": (-0.5, 0.5), "z": (-0.4, 0.4)}, {"x": 0.0})
-    (ep4,) = events(found, "EP4")
-    assert (ep4.parameters["y"], ep4.parameters["z"]) == pytest.approx((0, 0), abs=EXACT)
-    assert only(found).abscissa[ep4.index] == pytest.approx(-1, abs=1e-7)
 
 
 def test_cusps_and_the_crossing_of_a_section_below_it():
@@ -321,39 +301,31 @@ def test_swallowtail_beside_another_root_is_the_same_surface():
         assert branch.parameters["z"] == pytest.approx(branch.parameters["x"] ** 2 / 4, abs=EXACT)
 
 
-# The conditions of an optimum
-
-
-@pytest.mark.parametrize("unit", [1.0, 1000.0])
-def test_a_cubic_is_fastest_with_one_triple_root(unit):
-    """s³ + a s² + b s + 1: the product of the roots is given, so (s + 1)³ is best, with multipliers 1/(3 ωᵏ⁻¹)."""
-    a, b = symbols("a b")
-    model = from_coefficients([1, a * unit, b * unit**2, unit**3])
+def test_a_cubic_is_fastest_with_one_triple_root():
+    """s³ + a s² + b s + 1, the second in ms: the product of the roots is given, and multipliers are 1/(3 ωᵏ⁻¹)."""
+    model = from_coefficients([1, "1000*a", "1e6*b", "1e9"])
     design = solve(Problem(model=model, free={"a": (0.1, 6.0), "b": (0.1, 6.0)}, minimize="abscissa"))
-    assert (design.structure, design.abscissa) == ("EP3", pytest.approx(-unit, rel=EXACT))
+    assert (design.structure, design.abscissa) == ("EP3", pytest.approx(-1000, rel=EXACT))
     found = optimality(design)
-    assert (found.verdict, found.order) == ("strict minimum", 1)
     (root,) = found.roots
-    assert (root.multiplicity, root.share) == (3, pytest.approx(1))
-    assert (root.beta, root.kappa, *root.ties) == pytest.approx([1 / 3, 1 / 3 / unit, 1 / 3 / unit**2], rel=1e-9)
+    assert (found.verdict, found.order, root.multiplicity) == ("strict minimum", 1, 3)
+    assert (root.beta, root.kappa, *root.ties) == pytest.approx([1 / 3, 1 / 3e3, 1 / 3e6], rel=1e-9)
 
 
 # What is said
 
 
 def test_a_pattern_that_the_degree_has_no_room_for_is_named():
-    free = {"c": (0.1, 4.0), "k": (0.1, 5.0)}
-    with pytest.raises(InputError, match="takes 4 roots, and the polynomial has 2"):
-        traced(one(), "EP4", free)
+    plane = Problem(model=one(), free={"c": (0.1, 4.0), "k": (0.1, 5.0)})
+    for pattern, words in (
+        ("EP4", "takes 4 roots, and the polynomial has 2"),
+        ("EPX", "unknown pattern 'EPX'.*EP2"),
+        (None, "no pattern to trace.*EP2 weave capsize"),
+    ):
+        with pytest.raises(InputError, match=words):
+            trace(plane, pattern)
     with pytest.raises(InputError, match=r"'EPX' is no pattern.*EP2"):
-        traced(one(), "EPX", free)
-    plane = Problem(model=one(), free=free)
-    with pytest.raises(InputError, match=r"unknown pattern 'EPX'.*EP2"):
-        trace(plane, "EPX")
-    with pytest.raises(InputError, match="takes 3 roots, and the polynomial has 2"):
-        trace(plane, "EP3")
-    with pytest.raises(InputError, match=r"no pattern to trace.*EP2 weave capsize"):
-        trace(plane)
+        traced(one(), "EPX", dict(plane.free))
     with pytest.raises(InputError, match=r"EP3 needs 3 free parameters \(2 conditions"):
         traced(chain(), "EP3", PLANE, CHAIN)
 
@@ -380,46 +352,3 @@ def test_columns_of_unknowns_are_told_from_parameters_of_the_same_name():
     columns = found.to_json()["branches"][0]["columns"]
     assert columns["c1"] == pytest.approx(columns["capsize.c1"], abs=EXACT)
     assert np.ptp(columns["c1"]) == pytest.approx(3.9, abs=EXACT)
-
-
-@pytest.mark.parametrize(
-    ("name", "speed", "root"),
-    [("weave", 4.29238253634110, 0.0), ("capsize", 6.02426201538836, 0.0), ("EP2", 0.684283078892, 3.782904051293)],
-)
-def test_curves_of_the_benchmark_bicycle_start_at_its_published_speeds(name, speed, root):
-    """Meijaard et al. (2007), with the trail c = 0.08 m of the benchmark as the end of the box."""
-    fixed = load("problems/whipple_benchmark.toml").fixed
-    rest = {n: value for n, value in fixed.items() if n not in ("v", "c")}
-    branch = only(traced(whipple, name, {"v": (0.1, 10.0), "c": (0.08, 0.15)}, rest))
-    (end,) = (e for e in branch.events if e.detail == "c.min")
-    # printed to 14 digits, the double root to 12
-    assert end.parameters["v"] == pytest.approx(speed, abs=1e-12 if root == 0 else 1e-11)
-    assert (branch.unknowns["r"][end.index] if root else 0.0) == pytest.approx(root, abs=1e-11)
-
-
-def test_table_figure_and_command(real_pairs, tmp_path):
-    assert "EP2: 2 branches" in real_pairs.report()
-    mixed = traced(pair(), "2EP2", {"d": (3.0, 6.0), "k1": (0.5, 12.0), "q": (0.01, 4.0)}, {"k2": 1.0})
-    assert trace_figure(mixed, "d", "k1").axes
-    file = tmp_path / "pair.toml"
-    file.write_text(
-        """
-[model]
-name = "two oscillators"
-M = [["1", "0"], ["0", "1"]]
-D = [["d", "0"], ["0", "0"]]
-K = [["k1", "-q"], ["-q", "k2"]]
-[parameters]
-d = { min = 0.1, max = 6 }
-k1 = { min = 0.5, max = 12 }
-q = { min = 0.01, max = 4 }
-k2 = 1
-[objective]
-locate = "CEP2"
-"""
-    )
-    result = CliRunner().invoke(main, ["trace", str(file), "--json", "--starts", "4"])
-    assert result.exit_code == 0, result.output
-    (branch,) = json.loads(result.stdout)["branches"]
-    d, q = (np.array(branch["columns"][n]) for n in ("d", "q"))
-    assert q == pytest.approx(d / 2, abs=EXACT)

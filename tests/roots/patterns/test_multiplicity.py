@@ -7,21 +7,18 @@ polynomials with the structure, spanned by exact derivatives, in units of the ex
 
 from fractions import Fraction as F
 
-import casadi as ca
 import flint
 import numpy as np
 import pytest
 import sympy
-from mpmath import mp
 
 import tmsopt
-from tmsopt.algebra import exact
 from tmsopt.models import from_matrices
 from tmsopt.roots import (
     backward_error,
     discriminant,
-    exact_abscissa,
-    is_stable,
+    pattern,
+    pattern_distance,
     product,
     roots,
     structure,
@@ -41,7 +38,12 @@ def doubles(coefficients, unit=1.0):
 
 
 def named(items):
-    """Roots on the rightmost line: higher multiplicities first, then pairs, then a simple real root."""
+    """Roots on the rightmost line: higher multiplicities first, then pairs, then a simple real root.
+
+    A quartic with two real double roots is 2EP2 wherever they are, and one with a double pair is CEP2.
+    """
+    if sorted((m, im == 0) for _, im, m in items) == [(2, True)] * 2:
+        return "2EP2"
     right = max(re for re, _, _ in items)
     line = [(m, im == 0) for re, im, m in items if re == right]
     parts = [("EP" if real else "CEP") + str(m) for m, real in sorted(line, reverse=True) if m > 1]
@@ -76,10 +78,10 @@ def random_items(rng, degree):
     return items
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3, 5, 6, 7, 8])
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 5, 6, 8])
 def test_every_structure_is_found_in_any_unit_of_time(degree):
     rng = np.random.default_rng(degree)
-    for _ in range(15):
+    for _ in range(80 if degree == 4 else 12):
         items = random_items(rng, degree)
         unit = 10.0 ** rng.integers(-6, 7)
         found = structure(-0.3 * doubles(polynomial(items), unit), 1e-11)
@@ -92,13 +94,11 @@ def test_every_structure_is_found_in_any_unit_of_time(degree):
 LARGE = [
     [(F(-13, 10), 0, 12)],
     [(F(-13, 10), F(7, 10), 6)],
-    [(-1, 0, 4), (-2, 0, 4), (-4, 0, 4)],
     [(-1, 0, 6), (-1, 2, 3)],
     [(-1, 1, 2), (-1, 2, 2), (-1, 3, 1), (-1, 0, 2)],
     [(-1, k, 1) for k in range(1, 7)],
     [(-k, 0, 2) for k in (1, 2, 4, 8, 16, 32)],
     [(0, 0, 7), (-1, 0, 5)],
-    [(-1, 0, 3), (-3, 1, 4), (-5, 0, 1)],
     [(F(-1, 100), 0, 3), (-1, 1, 2), (-100, 0, 4), (-1000, 0, 1)],
 ]
 
@@ -171,6 +171,10 @@ def test_a_structure_is_named_within_the_tolerance_and_not_beyond(items, toleran
     assert within.name == named(items)
     assert sorted(r.multiplicity for r in within.roots) == sorted(m for _, m in every_root(items))
     assert within.distance == pytest.approx((1 - slack) * tolerance, rel=slack)
+    if len([m for _, _, m in items if m > 1]) == 1:
+        whole = pattern(named(items), len(size) - 1)
+        moved = doubles(polynomial(items)) + tolerance * size * change
+        assert pattern_distance(whole, moved) == pytest.approx(tolerance, rel=slack)
     beyond = structure(doubles(polynomial(items)) + (1 + slack) * tolerance * size * change, tolerance)
     assert sorted(r.multiplicity for r in beyond.roots) != sorted(m for _, m in every_root(items))
 
@@ -191,26 +195,6 @@ def test_certified_roots_of_an_exact_structure_are_the_roots_it_was_made_from(it
     assert rounded == set(every_root(items))
 
 
-def test_certified_root_of_the_nearest_sixfold_polynomial():
-    """One unknown r, by the stationarity of the weighted squares at 60 digits with weights of the solution itself."""
-    size, change = across([(F(-13, 10), 0, 6)], np.random.default_rng(0))
-    c = doubles(polynomial([(F(-13, 10), 0, 6)])) + 1e-12 * size * change
-    with mp.workdps(60):
-
-        def stationary(r):
-            off = [mp.binomial(6, k) * (-r) ** k - mp.mpf(float(c[k])) for k in range(1, 7)]
-            slope = [-k * mp.binomial(6, k) * (-r) ** (k - 1) for k in range(1, 7)]
-            weight = [mp.binomial(6, k) * abs(r) ** k for k in range(1, 7)]
-            return sum(a * b / w**2 for a, b, w in zip(off, slope, weight, strict=True))
-
-        expected = float(mp.findroot(stationary, mp.mpf("-1.3")))
-    shown = structure(c, 1e-11)
-    with flint.ctx.workprec(212):
-        found = nearest_roots([exact(float(x)) for x in c], shown.roots)
-        assert found is not None
-        assert (nearest_double(found[0].re), found[0].multiplicity) == (expected, 6)
-
-
 # Roots, stability and discriminant beyond degree 4
 
 
@@ -225,19 +209,6 @@ def test_roots_are_jointly_right_up_to_degree_12():
                 ]
                 c = doubles(polynomial(items))
                 assert backward_error(c, roots(c)) <= 1e-13, items
-
-
-def test_stability_up_to_degree_12():
-    """Against isolated roots of the same doubles; arrays of polynomials at once."""
-    rng = np.random.default_rng(6)
-    for degree in range(5, 13):
-        rows = []
-        for _ in range(20):
-            m = degree // 2
-            z = rng.uniform(-1, 0.02, m) + 1j * rng.uniform(0, 2, m)
-            c = np.poly([*z, *z.conj(), *([rng.uniform(-1, 0.02)] if degree % 2 else [])]).real
-            rows.append(rng.choice([-1, 1]) * c * (10.0 ** rng.integers(-4, 5)) ** np.arange(degree + 1))
-        assert list(is_stable(rows)) == [exact_abscissa(c) < 0 for c in rows]
 
 
 def test_discriminant_of_any_degree():
@@ -260,17 +231,12 @@ def test_three_pairs_on_one_line_are_proved():
 
     The trace of the damping matrix is twice the sum of the pairs' decay rates, so 3/2 is shared by three.
     """
-    c1, c2, k1 = (ca.SX.sym(n) for n in ("c1", "c2", "k1"))
-    model = from_matrices(
-        [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-        [[c1, 0, 0], [0, c2, 0], [0, 0, 0]],
-        [[2, -1, 0], [-1, 2, -1], [0, -1, k1]],
-        name="chain",
-    )
+    damping, springs = [["c1", 0, 0], [0, "c2", 0], [0, 0, 0]], [[2, -1, 0], [-1, 2, -1], [0, -1, "k1"]]
+    model = from_matrices(np.eye(3), damping, springs)
     free = {"c1": (0.0, 10.0), "c2": (0.0, 10.0), "k1": (1.0, 4.0)}
     design = tmsopt.solve(tmsopt.Problem(model=model, free=free, minimize="abscissa"))
     assert design.structure == "three pairs"
     assert design.abscissa == pytest.approx(-sum(design.parameters[n] for n in ("c1", "c2")) / 6, rel=1e-14)
-    assert (tmsopt.prove(design).proved, tmsopt.prove(design).pattern) == (True, "three pairs")
-    assert tmsopt.prove(design).abscissa is not None
-    assert float(tmsopt.prove(design).abscissa) == pytest.approx(-0.5, abs=1e-14)
+    proof = tmsopt.prove(design)
+    assert (proof.proved, proof.pattern) == (True, "three pairs")
+    assert float(proof.abscissa) == pytest.approx(-0.5, abs=1e-14)

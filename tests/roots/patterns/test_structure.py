@@ -4,13 +4,9 @@ Nothing is judged by recomputed roots: multiplicities come from FLINT's certifie
 coefficients, distances from least squares in the exact derivatives of the pattern.
 """
 
-from fractions import Fraction
-from functools import cache
-
 import numpy as np
 import pytest
-import sympy
-from helpers.oracles import abscissa_60, certified_roots, exact_multiplicities, roots_60
+from helpers.oracles import abscissa_60, exact_multiplicities, roots_60
 from hypothesis import given, settings, strategies as st
 from mpmath import mp
 
@@ -18,57 +14,18 @@ from tmsopt.roots import PATTERNS, exact_abscissa, exact_roots, pattern, pattern
 
 I2 = [1, 2, 2]  # −1 ± i
 EXAMPLES = {
-    "EP4": [[[1, 1]] * 4, [[1, 3]] * 4, [[1, -2]] * 4, [[1, 0]] * 4],
-    "EP3": [[[1, 1]] * 3 + [[1, 2]], [[1, -1]] * 3 + [[1, 5]], [[1, 0]] * 3 + [[1, 3]]],
-    "2EP2": [[[1, 1]] * 2 + [[1, 2]] * 2, [[1, -1]] * 2 + [[1, 4]] * 2, [[1, 0]] * 2 + [[1, 3]] * 2],
-    "CEP2": [[I2, I2], [[1, 0, 1]] * 2, [[1, -2, 10]] * 2],
-    "EP2": [
-        [[1, 1]] * 2 + [[1, 2], [1, 3]],
-        [[1, 1]] * 2 + [[1, 4, 5]],
-        [[1, -3]] * 2 + [[1, 0, 1]],
-        [[1, 0]] * 2 + [[1, 2], [1, 3]],
-        [[1, 0]] * 2 + [[1, 4, 5]],
-    ],
-    "EP2+pair": [[[1, 1]] * 2 + [I2], [[1, 0]] * 2 + [[1, 0, 4]], [[1, -2]] * 2 + [[1, -4, 13]]],
-    "pair+real": [[I2, [1, 1], [1, 2]], [[1, 0, 1], [1, 0], [1, 3]], [[1, -4, 5], [1, -2], [1, 7]]],
-    "two pairs": [[I2, [1, 2, 5]], [[1, 0, 1], [1, 0, 4]], [[1, -6, 10], [1, -6, 25]]],
-    "pair": [
-        [I2, [1, 2], [1, 3]],
-        [I2, [1, 4, 5]],
-        [I2, [1, 2], [1, 2]],  # a double root left of the rightmost line is not named
-        [[1, 0, 4], [1, 3], [1, 3]],
-    ],
-    "real": [
-        [[1, 1], [1, 2], [1, 3], [1, 4]],
-        [[1, 1], [1, 2], [1, 4, 5]],
-        [[1, 1], [1, 2], [1, 2], [1, 2]],  # EP3, EP2 and a pair left of it are not named
-        [[1, 1], [1, 2], [1, 3], [1, 3]],
-        [[1, -1], [1, 2], [1, 2], [1, 5]],
-        [[1, 0], [1, 1], [1, 2], [1, 3]],
-    ],
+    "EP4": [[[1, 1]] * 4, [[1, 0]] * 4],
+    "EP3": [[[1, 1]] * 3 + [[1, 2]], [[1, -1]] * 3 + [[1, 5]]],
+    "2EP2": [[[1, 1]] * 2 + [[1, 2]] * 2, [[1, 0]] * 2 + [[1, 3]] * 2],
+    "CEP2": [[I2, I2], [[1, 0, 1]] * 2],
+    "EP2": [[[1, 1]] * 2 + [[1, 2], [1, 3]], [[1, -3]] * 2 + [[1, 0, 1]]],
+    "EP2+pair": [[[1, 0]] * 2 + [[1, 0, 4]]],
+    "pair+real": [[[1, 0, 1], [1, 0], [1, 3]]],
+    "two pairs": [[[1, 0, 1], [1, 0, 4]]],
+    "pair": [[[1, 0, 4], [1, 3], [1, 3]]],  # a double root left of the rightmost line is not named
+    "real": [[[1, 0], [1, 1], [1, 2], [1, 3]], [[1, 1], [1, 2], [1, 2], [1, 2]]],  # nor is an EP3
 }
 EVERY = [(name, factors) for name, examples in EXAMPLES.items() for factors in examples]
-
-
-def named_by(roots):
-    """The expected name for exact roots with multiplicities: roots on the rightmost line, or two double roots."""
-    doubles = [z for z, m in roots if m == 2]
-    if len(doubles) == 2:
-        return "CEP2" if doubles[0].imag else "2EP2"
-    right = max(z.real for z, _ in roots)
-    real = sum(m for z, m in roots if z.real == right and z.imag == 0)
-    pairs = sum(m for z, m in roots if z.real == right and z.imag > 0)
-    names = {
-        (4, 0): "EP4",
-        (3, 0): "EP3",
-        (2, 1): "EP2+pair",
-        (2, 0): "EP2",
-        (1, 1): "pair+real",
-        (0, 2): "two pairs",
-        (0, 1): "pair",
-        (1, 0): "real",
-    }
-    return names[real, pairs]
 
 
 def scaled(coefficients, scale, leading):
@@ -79,12 +36,10 @@ def scaled(coefficients, scale, leading):
 @pytest.mark.parametrize(("name", "factors"), EVERY)
 def test_every_kind_is_named_in_any_unit_of_time(name, factors):
     """Scaling rounds each coefficient by about 1e-16, far below the tolerance of 1e-12."""
-    for scale in (1.0, 1e-6, 7e-3, 3.7, 1e8):
-        for leading in (1.0, -0.017):
-            found = structure(scaled(product(*factors), scale, leading))
-            assert found.name == name, (scale, leading)
-            assert found.distance <= 1e-14
-            assert sum(root.multiplicity for root in found.roots) == 4
+    for scale, leading in ((1.0, -0.017), (1e-6, 1.0), (1e8, 1.0)):
+        found = structure(scaled(product(*factors), scale, leading))
+        assert found.name == name, scale
+        assert found.distance <= 1e-14
 
 
 @pytest.mark.parametrize("power", [-78, -66, -58, -52, 90])
@@ -100,88 +55,7 @@ def test_the_greatest_root_that_is_a_double():
     assert structure([1, 1.7e308]).abscissa == -1.7e308
 
 
-@st.composite
-def integer_roots(draw):
-    """(re, im) of four integer roots, closed under conjugation, coincidences and shared lines likely."""
-    roots = []
-    while len(roots) < 4:
-        re, im = -draw(st.integers(-1, 4)), draw(st.integers(0, 3))
-        roots += [(re, im), (re, -im)] if im and len(roots) <= 2 else [(re, 0)]
-    return roots
-
-
-@settings(max_examples=60, deadline=None, derandomize=True)
-@given(integer_roots(), st.integers(-50, 50).filter(bool), st.integers(-20, 20))
-def test_random_integer_roots_are_named_by_their_exact_multiplicities(roots, leading, power):
-    pairs = [[1, -2 * re, re * re + im * im] for re, im in roots if im > 0]
-    coefficients = product([leading], *pairs, *([1, -re] for re, im in roots if not im))
-    exact = certified_roots(coefficients)
-    assert sorted(m for m, d in exact_multiplicities(coefficients) for _ in range(d)) == sorted(m for _, m in exact)
-    multiset = {z: roots.count(z) for z in roots}
-    assert sorted((round(float(z.real)), round(float(z.imag)), m) for z, m in exact) == sorted(
-        (*z, m) for z, m in multiset.items()
-    )
-    expected = named_by([(complex(*z), m) for z, m in multiset.items()])
-
-    unit = 2.0**power  # exact
-    found = structure(scaled([float(c) for c in coefficients], unit, 1.0))
-    assert found.name == expected
-    rightmost = max(re for re, _ in roots)
-    # the rightmost roots are simple or named, and a distance of 1 or more from the others: a few thousand roundings
-    assert found.abscissa / unit == pytest.approx(rightmost, abs=1e-12)
-    if max(multiset.values()) > 1 and expected not in ("real", "pair"):
-        # the multiplicities themselves, root by root
-        assert {(round(r.re / unit), round(r.im / unit)): r.multiplicity for r in found.roots} == multiset
-
-
 # Tolerance
-
-
-LINEAR = ["EP4", "EP3", "2EP2", "CEP2", "EP2"]
-UNKNOWNS = {"EP4": [-1], "EP3": [-1, -3], "2EP2": [5, 4], "CEP2": [2, 2], "EP2": [-1, 7, 12]}
-"""Unknowns of (s+1)⁴, (s+1)³(s+3), (s+1)²(s+4)², (s²+2s+2)² and (s+1)²(s+3)(s+4)."""
-
-
-@cache
-def relative_derivatives(name):
-    """Monic coefficients of a pattern and their derivatives, relative to the terms they are summed from."""
-    u = sympy.symbols(f"u0:{len(UNKNOWNS[name])}")
-    at = dict(zip(u, UNKNOWNS[name], strict=True))
-    monic = [sympy.expand(c) for c in PATTERNS[name].monic(u)]
-    p = np.array([float(sympy.sympify(c).subs(at)) for c in monic])
-    jacobian = np.array([[float(sympy.diff(c, x).subs(at)) for x in u] for c in monic])
-    with mp.workdps(40):
-        size = np.array([1.0])
-        for z, m in certified_roots([Fraction(c) for c in p]):
-            for _ in range(m):
-                size = np.convolve(size, [1.0, float(abs(z))])
-    return p, jacobian[1:] / size[1:, None]
-
-
-def euclidean_distance(jacobian, change):
-    """The smallest root sum of squares of relative changes that leads back to the pattern."""
-    return float(np.linalg.norm(change - jacobian @ np.linalg.lstsq(jacobian, change, rcond=None)[0]))
-
-
-def perturbed(name, seed, distance):
-    """A quartic at a known relative distance from a pattern, to first order."""
-    p, jacobian = relative_derivatives(name)
-    size = np.abs(p[1:]) if name != "CEP2" else np.array([4, 6, 4, 1]) * 2.0 ** np.array([0.5, 1, 1.5, 2])
-    rng = np.random.default_rng(seed)
-    while True:
-        change = rng.choice([-1, 1], 4) * rng.uniform(0.5, 1, 4)
-        reach = euclidean_distance(jacobian, change)
-        if reach > 0.05:
-            return [1.0, *(p[1:] + size * change * distance / reach)]
-
-
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("name", LINEAR)
-def test_pattern_distance_is_the_least_root_sum_of_squares(name, seed):
-    """Against linear least squares in exact derivatives; 1e-3 is left for the second order of a change of 1e-6."""
-    for distance in (1e-6, 1e-8):
-        found = pattern_distance(PATTERNS[name], perturbed(name, seed, distance))
-        assert found == pytest.approx(distance, rel=1e-3)
 
 
 @pytest.mark.parametrize(("name", "factors"), [e for e in EVERY if e[0] not in ("real", "pair")])
@@ -190,9 +64,8 @@ def test_zero_tolerance_cannot_be_decided_at_an_exceptional_point(name, factors)
 
 
 def test_zero_tolerance_is_decided_away_from_every_pattern():
-    for name in ("pair", "real"):
-        assert structure(product(*EXAMPLES[name][0]), 0.0).name == name
-        assert structure(product(*EXAMPLES[name][1]), 0.0).name == name
+    for factors, name in (([I2, [1, 2], [1, 3]], "pair"), ([[1, 1], [1, 2], [1, 4, 5]], "real")):
+        assert structure(product(*factors), 0.0).name == name
 
 
 def test_undecided_only_where_rounding_decides():
@@ -224,33 +97,23 @@ def test_structure_refuses_what_is_no_polynomial_of_degree_1_to_12(bad):
 # Patterns that can be located, and the distance to them
 
 
-@pytest.mark.parametrize(
-    ("name", "codimension"),
-    [("EP4", 3), ("EP3", 2), ("2EP2", 2), ("CEP2", 2), ("EP2", 1), ("weave", 1), ("capsize", 1), ("resonance", 3)],
-)
-def test_codimension_is_that_of_the_table(name, codimension):
-    """Section 1 of the design."""
-    assert PATTERNS[name].codimension == codimension
-    assert set(PATTERNS) == {"EP4", "EP3", "2EP2", "CEP2", "EP2", "weave", "capsize", "resonance"}
+def test_codimensions():
+    known = {"EP4": 3, "EP3": 2, "2EP2": 2, "CEP2": 2, "EP2": 1, "weave": 1, "capsize": 1, "resonance": 3}
+    assert {name: pattern.codimension for name, pattern in PATTERNS.items()} == known
 
 
 MEMBERS = {
-    "EP4": [EXAMPLES["EP4"][0]],
-    "EP3": [*EXAMPLES["EP3"][:2], [[1, 1], [1, 4], [1, 4], [1, 4]]],
-    "2EP2": EXAMPLES["2EP2"],
-    "CEP2": EXAMPLES["CEP2"],
-    "EP2": [*EXAMPLES["EP2"][:3], [I2, [1, 3], [1, 3]]],
-    "weave": [[[1, 0, 2], [1, 3, 1]], [[1, 0, 2], [1, 1], [1, -3]], [[1, 0, 4], [1, 4, 5]]],
-    "capsize": [[[1, 0], [1, 3, 3, 1]], [[1, 0], [1, 2], [1, 2, 5]], [[1, 0], [1, -2], [1, 1], [1, 7]]],
+    **{name: EXAMPLES[name] for name in ("EP4", "EP3", "2EP2", "CEP2", "EP2")},
+    "weave": [[[1, 0, 2], [1, 3, 1]], [[1, 0, 2], [1, 1], [1, -3]]],
+    "capsize": [[[1, 0], [1, 3, 3, 1]], [[1, 0], [1, -2], [1, 1], [1, 7]]],
     "resonance": [[[1, 0, 1]] * 2, [[1, 0, 9]] * 2],
 }
 
 
 @pytest.mark.parametrize("name", MEMBERS)
-@pytest.mark.parametrize("leading", [1.0, -7.0])
-def test_members_of_a_pattern_are_at_distance_0(name, leading):
+def test_members_of_a_pattern_are_at_distance_0(name):
     for factors in MEMBERS[name]:
-        assert pattern_distance(PATTERNS[name], [leading * c for c in product(*factors)]) <= 1e-14, factors
+        assert pattern_distance(PATTERNS[name], [-7 * c for c in product(*factors)]) <= 1e-14, factors
 
 
 def test_distance_to_capsize_is_the_whole_last_coefficient():
