@@ -39,7 +39,7 @@ _MAX_CLUSTER_STEPS = 60
 _CLOSE = 1e-3, 1e-8
 """A spread below this share of the size of the eigenvalues ends the first stage; the smaller one if the second stage
 then fails, as it does for an EP next to a diabolic point."""
-_MIN_DAMPING = 1e-3
+_MIN_DAMPING = 0.01
 _DECREASE = 0.1  # share of the predicted decrease that a damped step must reach
 _MAX_CHAIN_STEPS = 60
 _STALLED_CLUSTERS = 5  # steps of the first stage without progress that end it
@@ -170,7 +170,7 @@ def find_point(
                 point = refine(family, targets, p, state.means, start if is_nearest else None, state.steps)
             except np.linalg.LinAlgError:  # an eigenvalue has several eigenvectors there
                 point = ExceptionalPoint(p, (), np.inf, 0.0, np.full(len(p), np.inf), (state.steps, 0))
-            if point.is_found:
+            if point.is_found or not state.is_close:
                 break
             point = replace(point, p=p)
         return point
@@ -197,13 +197,18 @@ def gather_roots(family: Family, targets: Sequence[Target]) -> tuple[complex, ..
 
 @dataclass(frozen=True)
 class _Gathered:
-    """A step of the first stage: the clusters of a design, what separates their eigenvalues, and its slopes."""
+    """A step of the first stage: the clusters of a design, what separates their eigenvalues, and its slopes.
+
+    Attributes:
+        is_close: whether the first stage has ended because the eigenvalues are close.
+    """
 
     p: Array
     clusters: tuple[Cluster, ...]
     residual: Array
     jacobian: Array
     steps: int = 0
+    is_close: bool = False
 
     @property
     def means(self) -> tuple[complex, ...]:
@@ -239,9 +244,10 @@ def _gather(
     state = _measure(family, start, targets, groups, size)
     errors = list[float]()
     while state and state.steps < _MAX_CLUSTER_STEPS:
+        if state.largest_distance(targets) <= close * size:
+            return replace(state, is_close=True)
         errors.append(float(np.linalg.norm(state.residual)))
-        has_stalled = len(errors) > _STALLED_CLUSTERS and errors[-1] > _PROGRESS * errors[-1 - _STALLED_CLUSTERS]
-        if has_stalled or state.largest_distance(targets) <= close * size:
+        if len(errors) > _STALLED_CLUSTERS and errors[-1] > _PROGRESS * errors[-1 - _STALLED_CLUSTERS]:
             break
         step, damping = _step_in_box(state.jacobian, state.residual, state.p, family), 1.0
         while damping > _MIN_DAMPING:
