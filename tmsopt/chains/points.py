@@ -42,7 +42,7 @@ then fails, as it does for an EP next to a diabolic point."""
 _MIN_DAMPING = 0.01
 _DECREASE = 0.1  # share of the predicted decrease that a damped step must reach
 _MAX_CHAIN_STEPS = 60
-_STALLED_CLUSTERS = 5  # steps of the first stage without progress that end it
+_STALLED_CLUSTERS = 8  # steps of the first stage without progress that end it
 _STALLED_STEPS = 3  # steps without a smaller residual that end the second stage
 _PROGRESS = 0.5  # a step that leaves more than this share of the error has stalled
 _STILL = 4e-16  # a step of this share of the ranges, and an error of this size, are at rounding
@@ -231,14 +231,22 @@ def _gather(
     changes = linearised_slopes(matrices, slopes)
 
     def predict_step(group: Complex, target: Target) -> float:
-        members = np.isin(s, group)
+        """Length of the step that makes a group coincide to first order, and the share of the equations that it leaves.
+
+        Near eigenvalues often cross with their own eigenvectors; those that can become defective respond strongly.
+        """
+        members = np.flatnonzero(np.isin(s, group))[: target.order]
         cluster = _gather_eigenvalues(s[members], right[:, members], left[members])
         residual, jacobian = _separate([cluster], [target], changes, family, size)
+        if not jacobian.any():  # equal for all parameters, or none of them moves one against the other
+            return np.inf
+        if not residual.any():
+            return 0.0
         if not np.isfinite(jacobian).all():
             return np.inf
         step = np.linalg.lstsq(jacobian * family.widths, -residual, rcond=_CUTOFF)[0]
         rest = residual + jacobian @ (family.widths * step)
-        return float(np.linalg.norm(step) + np.linalg.norm(rest) / (np.linalg.norm(residual) or 1.0))
+        return float(np.linalg.norm(step) + np.linalg.norm(rest) / np.linalg.norm(residual))
 
     groups = _choose_groups(s, targets, family, predict_step if family.names else _spread, rng)
     state = _measure(family, start, targets, groups, size)

@@ -190,7 +190,7 @@ def linearise(matrices: Any) -> Any:
 
 
 def eigenvalues_of(matrices: Complex) -> Complex:
-    """The eigenvalues of a matrix polynomial with a regular leading matrix; those of real ones are real or conjugate."""
+    """The eigenvalues of a matrix polynomial with a regular leading matrix; for a real one real or conjugate."""
     M = linearise(matrices)
     return np.asarray(np.linalg.eigvals(M if M.imag.any() else M.real), dtype=complex)
 

@@ -129,7 +129,8 @@ def solve_any_status(
         and policy.local is POLICY.local
         and (outcome := locate_by_chains(problem, options, extra_starts))
     ):
-        return _assemble(problem, outcome, sense_notes(problem), {}, began, with_bound)
+        notes = (*sense_notes(problem), *_describe_hermitian(problem))
+        return _assemble(problem, outcome, notes, {}, began, with_bound)
     form = real_form(problem)
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
     solution = _search_box(form.problem, options, extra_starts, skipped_parts, with_bound, policy)
