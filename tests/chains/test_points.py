@@ -50,6 +50,7 @@ def test_all_eigenvalues_of_a_spin_meet(n, start):
         ([["a + 1j*b", 0], [0, "0.3 - 0.1j"]], {"a": (-1, 1), "b": (-1, 1)}, "EP2"),  # uncoupled
         ([["1j*g", 1, 0], [1, "-1j*g", 0], [0, 0, "d"]], {"g": (0.2, 2), "d": (-1, 1)}, "EP3"),  # EP2 beside a mode
         ([["1j*g", 1, 0, 0], [1, "-1j*g", 0, 0], [0, 0, "1j*g", 1], [0, 0, 1, "-1j*g"]], {"g": (0.2, 2)}, "EP4"),
+        ([[[0, 1, 0, 0, 0, "r"][j - i] for j in range(6)] for i in range(6)], {"r": (0.2, 2)}, "EP2"),  # normal
     ],
 )
 def test_where_eigenvectors_do_not_meet_there_is_none(H, free, locate):

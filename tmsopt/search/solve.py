@@ -13,7 +13,7 @@ from tmsopt.evaluation import missed_note, prove_worst_case
 from tmsopt.evaluation.bound import minimizes_abscissa
 from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.evaluation.exclusion import bound_without_search
-from tmsopt.evaluation.recheck import Evaluation
+from tmsopt.evaluation.recheck import Evaluation, recheck
 from tmsopt.evaluation.stored import find_storable_design
 from tmsopt.models.user_spectrum import distance_beyond_axis
 from tmsopt.problem import (
@@ -141,6 +141,12 @@ def solve_any_status(
     if form.problem is problem:
         return solution
     solution = form.to_user(solution, problem)
+    if solution.status == "optimal" and problem.pattern is not None:
+        checked = recheck(
+            problem, solution.parameters
+        )  # the polynomial of the real form has rounding errors of its own
+        if problem.pattern.name in checked.violations:
+            solution = replace(solution, status="not_converged", violations=checked.amounts)
     return replace(solution, notes=(*solution.notes, *_describe_hermitian(problem)))
 
 
