@@ -4,8 +4,7 @@ In: a problem or system. Out: where the rival ended, and after how long it was h
 rival sees; `searches` ends by itself, `seekers` until stopped, `race` compares them at equal accuracy.
 """
 
-from benchmarks.rivals.basins import MET, Best, best_known
-from benchmarks.rivals.evolution import POINTS, Evolved, Followed, evolve, evolve_system, least_violation
+from benchmarks.rivals.evolution import POINTS, Evolved, Followed, best_known, evolve, evolve_system, least_violation
 from benchmarks.rivals.nonsmooth import NONSMOOTH, Poles, poles
 from benchmarks.rivals.race import OWN, TOLERANCES, Heat, Moment, Run, heat, median_ratio, own, run
 from benchmarks.rivals.reduced import FEASIBLE, Found, Reduced, Watch
@@ -16,14 +15,12 @@ __all__ = [
     "EVOLUTION",
     "FEASIBLE",
     "LOCAL",
-    "MET",
     "NONSMOOTH",
     "OWN",
     "POINTS",
     "SEEKERS",
     "STARTS",
     "TOLERANCES",
-    "Best",
     "Evolved",
     "Followed",
     "Found",

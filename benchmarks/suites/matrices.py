@@ -331,6 +331,10 @@ def systems() -> tuple[System, ...]:
             *map(_gyroscopes, (5, 20)),
             _masses(40),
         ]
-    tables = tomllib.loads(_SMALL.read_text(encoding="utf-8"))["systems"]
     none = _system("chain with a detuned end", "v -2 2", "EP2", H=_chain(["v", *["0"] * 19], ["1"], ["1"]))
-    return (*large, *(_system(**table) for table in tables), none)
+    return (*large, *small("systems"), none)
+
+
+def small(key: str) -> list[System]:
+    """The systems of a table of the file: `systems`, or `examples` of EasterEig."""
+    return [_system(**table) for table in tomllib.loads(_SMALL.read_text(encoding="utf-8"))[key]]

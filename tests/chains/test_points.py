@@ -50,11 +50,39 @@ def test_all_eigenvalues_of_a_spin_meet(n, start):
         ([["a + 1j*b", 0], [0, "0.3 - 0.1j"]], {"a": (-1, 1), "b": (-1, 1)}, "EP2"),  # uncoupled
         ([["1j*g", 1, 0], [1, "-1j*g", 0], [0, 0, "d"]], {"g": (0.2, 2), "d": (-1, 1)}, "EP3"),  # EP2 beside a mode
         ([["1j*g", 1, 0, 0], [1, "-1j*g", 0, 0], [0, 0, "1j*g", 1], [0, 0, 1, "-1j*g"]], {"g": (0.2, 2)}, "EP4"),
+        ([[[0, 1, 0, 0, 0, "r"][j - i] for j in range(6)] for i in range(6)], {"r": (0.2, 2)}, "EP2"),  # normal
     ],
 )
 def test_where_eigenvectors_do_not_meet_there_is_none(H, free, locate):
     found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(H), free=free, locate=locate), throw=False)
     assert found.status != "optimal"
+
+
+def test_eigenvalues_that_are_always_equal_are_not_brought_together():
+    """A PT dimer has its EP2 at g = 1; three modes without coupling have the eigenfrequency 0 for all g."""
+    H = [["1j*g", 1, 0, 0, 0], [1, "-1j*g", 0, 0, 0], *([[0] * 5] * 3)]
+    point, *_ = point_of(H, {"g": (0.2, 3)}, "EP2", start=0.9)
+    assert point is not None
+    assert abs(point.p[0] - 1) <= EXACT
+
+
+@pytest.mark.parametrize("start", [0.37, 0.8])
+def test_the_eigenvalues_that_cross_are_not_mistaken_for_those_that_become_defective(start):
+    """Twenty masses in a row between springs: mode k has its critical damping at c = 2 √(1 + 4 sin²(kπ/42)).
+
+    Overdamped eigenvalues of two modes cross. They are nearer to each other, but keep their eigenvectors.
+    """
+    n = 20
+    M = np.eye(n).tolist()
+    D = [["c" if i == j else 0 for j in range(n)] for i in range(n)]
+    K = (3 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)).tolist()
+    posed = tmsopt.Problem(from_matrices(M=M, D=D, K=K), free={"c": (0.5, 6)}, locate="EP2").posed
+    point = find_point(family_of(posed), targets_of("EP2", is_complex=False), np.array([0.5 + 5.5 * start]))
+    critical = 2 * np.sqrt(1 + 4 * np.sin(np.arange(1, n + 1) * np.pi / (2 * n + 2)) ** 2)
+    assert point is not None
+    assert point.is_found
+    assert np.abs(critical - point.p[0]).min() <= 4 * EXACT
+    assert point.steps[0] <= 5
 
 
 def test_an_ep3_is_not_two_ep2():

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import accumulate, chain
 from typing import Any, NamedTuple, Union
 
@@ -260,8 +260,14 @@ def constant(x: Any) -> Node:
     if isinstance(x, Node):
         return x
     if isinstance(x, float):
-        return Node(CONSTANT, (), Fraction(str(x)) if math.isfinite(x) else float(x))
-    return Node(CONSTANT, (), Fraction(x) if isinstance(x, int | Fraction) else Fraction(int(x.p), int(x.q)))
+        return _fraction(Fraction(str(x))) if math.isfinite(x) else Node(CONSTANT, (), float(x))
+    return _fraction(Fraction(x) if isinstance(x, int | Fraction) else Fraction(int(x.p), int(x.q)))
+
+
+@lru_cache(maxsize=4096)
+def _fraction(value: Fraction) -> Node:
+    """A constant; the equal entries of a large matrix are one node, which is faster."""
+    return Node(CONSTANT, (), value)
 
 
 def make_node(op: str, *arguments: Any) -> Node:
@@ -276,7 +282,7 @@ def make_node(op: str, *arguments: Any) -> Node:
         fractions.append(o.value if is_fraction else None)
     compute_fraction = _FRACTION_OPERATIONS.get(op) if None not in fractions else None
     if compute_fraction and (number := compute_fraction(*fractions)) is not None:
-        return Node(CONSTANT, (), number)
+        return _fraction(number)
     simplified = _simplify(op, operands, fractions) if op in _SIMPLIFIABLE else None
     return Node(op, operands) if simplified is None else simplified
 

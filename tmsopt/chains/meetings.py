@@ -156,6 +156,7 @@ def _find_crossing(
             if count > len(values) or values[-count] > max(_NEARLY_SINGULAR, reach):
                 break
             if values[-count] <= _ZERO_BLOCK:
+                p = np.where(np.abs(p) <= np.finfo(float).eps * family.widths, 0.0, p)
                 return {**parameters, **dict(zip(family.names, p.tolist(), strict=True))}, z
             U, V = left[:, -count:].conj().T, right[-count:].conj().T
             changes = [

@@ -6,7 +6,7 @@ solves the equations of the Jordan chain for the parameters and the eigenvalue, 
 so that conditions that a symmetry fulfils for all parameters do no harm.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -22,6 +22,7 @@ from tmsopt.roots.chains import (
     Chain,
     Cluster,
     eigenvalues_of,
+    eigenvectors_of,
     find_borders,
     linearise,
     linearised_slopes,
@@ -38,9 +39,10 @@ _MAX_CLUSTER_STEPS = 60
 _CLOSE = 1e-3, 1e-8
 """A spread below this share of the size of the eigenvalues ends the first stage; the smaller one if the second stage
 then fails, as it does for an EP next to a diabolic point."""
-_MIN_DAMPING = 1e-3
+_MIN_DAMPING = 0.01
 _DECREASE = 0.1  # share of the predicted decrease that a damped step must reach
 _MAX_CHAIN_STEPS = 60
+_STALLED_CLUSTERS = 8  # steps of the first stage without progress that end it
 _STALLED_STEPS = 3  # steps without a smaller residual that end the second stage
 _PROGRESS = 0.5  # a step that leaves more than this share of the error has stalled
 _STILL = 4e-16  # a step of this share of the ranges, and an error of this size, are at rounding
@@ -168,7 +170,7 @@ def find_point(
                 point = refine(family, targets, p, state.means, start if is_nearest else None, state.steps)
             except np.linalg.LinAlgError:  # an eigenvalue has several eigenvectors there
                 point = ExceptionalPoint(p, (), np.inf, 0.0, np.full(len(p), np.inf), (state.steps, 0))
-            if point.is_found:
+            if point.is_found or not state.is_close:
                 break
             point = replace(point, p=p)
         return point
@@ -186,7 +188,7 @@ def refine_near(family: Family, targets: Sequence[Target], p: Array) -> Exceptio
 def gather_roots(family: Family, targets: Sequence[Target]) -> tuple[complex, ...] | None:
     """The means of the eigenvalues that come nearest to the targets, for a family without parameters."""
     try:
-        groups = _choose_groups(eigenvalues_of(family.matrices(np.empty(0))), targets, family, None)
+        groups = _choose_groups(eigenvalues_of(family.matrices(np.empty(0))), targets, family, _spread)
     except np.linalg.LinAlgError:
         return None
     means = [complex(group.mean()) for group in groups if group is not None]
@@ -195,13 +197,18 @@ def gather_roots(family: Family, targets: Sequence[Target]) -> tuple[complex, ..
 
 @dataclass(frozen=True)
 class _Gathered:
-    """A step of the first stage: the clusters of a design, what separates their eigenvalues, and its slopes."""
+    """A step of the first stage: the clusters of a design, what separates their eigenvalues, and its slopes.
+
+    Attributes:
+        is_close: whether the first stage has ended because the eigenvalues are close.
+    """
 
     p: Array
     clusters: tuple[Cluster, ...]
     residual: Array
     jacobian: Array
     steps: int = 0
+    is_close: bool = False
 
     @property
     def means(self) -> tuple[complex, ...]:
@@ -218,56 +225,92 @@ def _gather(
     family: Family, targets: Sequence[Target], start: Array, rng: np.random.Generator | None, close: float
 ) -> _Gathered | None:
     """Bring the eigenvalues of each target together, by damped Gauss–Newton steps in the box."""
-    spectrum = _Spectrum(family, start)
-    s = spectrum.form.eigenvalues
+    matrices, slopes = family.expand(start)
+    s, left, right = eigenvectors_of(matrices)
     size = float(np.abs(s - s.mean()).max() or np.abs(s).max()) or 1.0
-    state = _measure(spectrum, targets, _choose_groups(s, targets, family, rng), size)
+    changes = linearised_slopes(matrices, slopes)
+
+    def predict_step(group: Complex, target: Target) -> float:
+        """Length of the step that makes a group coincide to first order, and the share of the equations that it leaves.
+
+        Near eigenvalues often cross with their own eigenvectors; those that can become defective respond strongly.
+        """
+        members = np.flatnonzero(np.isin(s, group))[: target.order]
+        cluster = _gather_eigenvalues(s[members], right[:, members], left[members])
+        residual, jacobian = _separate([cluster], [target], changes, family, size)
+        if not jacobian.any():  # equal for all parameters, or none of them moves one against the other
+            return np.inf
+        if not residual.any():
+            return 0.0
+        if not np.isfinite(jacobian).all():
+            return np.inf
+        step = np.linalg.lstsq(jacobian * family.widths, -residual, rcond=_CUTOFF)[0]
+        rest = residual + jacobian @ (family.widths * step)
+        return float(np.linalg.norm(step) + np.linalg.norm(rest) / np.linalg.norm(residual))
+
+    groups = _choose_groups(s, targets, family, predict_step if family.names else _spread, rng)
+    state = _measure(family, start, targets, groups, size)
+    errors = list[float]()
     while state and state.steps < _MAX_CLUSTER_STEPS:
         if state.largest_distance(targets) <= close * size:
+            return replace(state, is_close=True)
+        errors.append(float(np.linalg.norm(state.residual)))
+        if len(errors) > _STALLED_CLUSTERS and errors[-1] > _PROGRESS * errors[-1 - _STALLED_CLUSTERS]:
             break
         step, damping = _step_in_box(state.jacobian, state.residual, state.p, family), 1.0
         while damping > _MIN_DAMPING:
-            spectrum = _Spectrum(family, np.clip(state.p + damping * step, *family.box.T))
-            pairs = zip(state.means, targets, strict=True)
-            groups = [_nearest(spectrum.form.eigenvalues, mean, t, family) for mean, t in pairs]
-            trial = _measure(spectrum, targets, groups, size)
-            if trial and np.linalg.norm(trial.residual) <= (1 - _DECREASE * damping) * np.linalg.norm(state.residual):
-                break
+            p = np.clip(state.p + damping * step, *family.box.T)
+            s = eigenvalues_of(family.matrices(p))
+            groups = [_nearest(s, mean, t, family) for mean, t in zip(state.means, targets, strict=True)]
+            clusters = [_gather_eigenvalues(group) for group in groups if group is not None]
+            if len(clusters) == len(targets):
+                residual, _ = _separate(clusters, targets, (), family, size)
+                if np.linalg.norm(residual) <= (1 - _DECREASE * damping) * errors[-1]:
+                    break
             damping /= 2
         else:
             break
-        assert trial is not None
-        state = replace(trial, steps=state.steps + 1)
+        following = _measure(family, p, targets, groups, size)
+        assert following is not None
+        state = replace(following, steps=state.steps + 1)
     return state
 
 
-class _Spectrum:
-    """The matrices of a design with the Schur form of their linearisation."""
-
-    def __init__(self, family: Family, p: Array) -> None:
-        self.family, self.p = family, p
-        self.matrices, self.slopes = family.expand(p)
-        self.form = schur_form(linearise(self.matrices), family.is_complex)
-
-
 def _measure(
-    spectrum: _Spectrum, targets: Sequence[Target], groups: Sequence[Complex | None], size: float
+    family: Family, p: Array, targets: Sequence[Target], groups: Sequence[Complex | None], size: float
 ) -> _Gathered | None:
-    """The clusters of groups of eigenvalues, their power sums and distances from the axes in powers of `size`."""
-    clusters = [make_cluster(spectrum.form, group) for group in groups if group is not None]
+    """The clusters of groups of eigenvalues with the equations that bring them together."""
+    matrices, slopes = family.expand(p)
+    form = schur_form(linearise(matrices), is_complex=True)
+    clusters = [make_cluster(form, group) for group in groups if group is not None]
     if len(clusters) < len(targets):
         return None
-    changes = linearised_slopes(spectrum.matrices, spectrum.slopes)
+    changes = linearised_slopes(matrices, slopes)
+    return _Gathered(p, tuple(clusters), *_separate(clusters, targets, changes, family, size))
+
+
+_NO_VECTORS = np.zeros((0, 0), dtype=complex)
+
+
+def _gather_eigenvalues(group: Complex, right: Complex = _NO_VECTORS, left: Complex = _NO_VECTORS) -> Cluster:
+    """The cluster of simple eigenvalues, by their eigenvectors if these are given."""
+    return Cluster(complex(group.mean()), np.diag(group - group.mean()), right, left)
+
+
+def _separate(
+    clusters: Sequence[Cluster], targets: Sequence[Target], changes: Sequence[Complex], family: Family, size: float
+) -> tuple[Array, Array]:
+    """The power sums of clusters and their distances from the axes, in powers of `size`; and their derivatives."""
     residual, jacobian = list[Array](), list[Array]()
     for cluster, target in zip(clusters, targets, strict=True):
         scale = size ** -np.arange(1.0, target.order + 1)
         responses = [cluster.respond(change) for change in changes]
         rows = np.array([_stack(cluster.mean, cluster.power_sums, target), *(_stack(*r, target) for r in responses)])
         rows = (rows * scale).T
-        parts = rows.real if target.is_real(spectrum.family.is_complex) else np.concatenate([rows.real, rows.imag])
+        parts = rows.real if target.is_real(family.is_complex) else np.concatenate([rows.real, rows.imag])
         residual.append(parts[:, 0])
         jacobian.append(parts[:, 1:])
-    return _Gathered(spectrum.p, tuple(clusters), np.concatenate(residual), np.concatenate(jacobian))
+    return np.concatenate(residual), np.concatenate(jacobian)
 
 
 def _stack(mean: complex, power_sums: Complex, target: Target) -> Complex:
@@ -277,11 +320,15 @@ def _stack(mean: complex, power_sums: Complex, target: Target) -> Complex:
 
 
 def _choose_groups(
-    eigenvalues: Complex, targets: Sequence[Target], family: Family, rng: np.random.Generator | None
+    eigenvalues: Complex,
+    targets: Sequence[Target],
+    family: Family,
+    rank: Callable[[Complex, Target], float],
+    rng: np.random.Generator | None = None,
 ) -> list[Complex | None]:
     """The eigenvalues that shall coincide, one group for each target, without common ones; None where too few are left.
 
-    The highest order chooses first. Without `rng` it takes the group with the least spread.
+    The highest order chooses first. Without `rng` it takes the group with the lowest rank.
     """
     groups, left = dict[int, Complex](), eigenvalues
     for k in sorted(range(len(targets)), key=lambda k: -targets[k].order):
@@ -289,10 +336,15 @@ def _choose_groups(
         candidates = [g for z in left if (g := _nearest(left, z, target, family)) is not None]
         if not candidates:
             return [None]
-        spreads = [np.abs(g - g.mean()).max() + abs(_stack(g.mean(), _NO_SUMS, target)[0]) for g in candidates]
-        group = candidates[int(np.argmin(spreads) if rng is None else rng.integers(len(candidates)))]
+        ranks = [rank(g, target) for g in candidates] if rng is None else []
+        group = candidates[int(np.argmin(ranks) if rng is None else rng.integers(len(candidates)))]
         groups[k], left = group, left[~np.isin(left, group)]
     return [groups[k] for k in range(len(targets))]
+
+
+def _spread(group: Complex, target: Target) -> float:
+    """Largest distance of an eigenvalue of a group from the mean, with the distance of the mean from its axis."""
+    return float(np.abs(group - group.mean()).max() + abs(_stack(group.mean(), _NO_SUMS, target)[0]))
 
 
 def _nearest(eigenvalues: Complex, z: complex, target: Target, family: Family) -> Complex | None:

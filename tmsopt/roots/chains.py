@@ -192,8 +192,26 @@ def linearise(matrices: Any) -> Any:
 
 
 def eigenvalues_of(matrices: Complex) -> Complex:
-    """The eigenvalues of a matrix polynomial with a regular leading matrix."""
-    return np.asarray(np.linalg.eigvals(linearise(matrices)), dtype=complex)
+    """The eigenvalues of a matrix polynomial with a regular leading matrix; for a real one real or conjugate."""
+    M = linearise(matrices)
+    return np.asarray(np.linalg.eigvals(M if M.imag.any() else M.real), dtype=complex)
+
+
+def eigenvectors_of(matrices: Complex) -> tuple[Complex, Complex, Complex]:
+    """The eigenvalues, and the left and right eigenvectors of the linearised matrix, as rows Y and columns X.
+
+    Y X has the diagonal 1. It is infinite or large where eigenvalues nearly coincide.
+
+    Raises:
+        LinAlgError: if the matrix is not finite.
+    """
+    from scipy.linalg import eig
+
+    M = linearise(matrices)
+    if not np.isfinite(M).all():
+        raise np.linalg.LinAlgError("the matrices are not finite")
+    s, left, right = eig(M if M.imag.any() else M.real, left=True, right=True)
+    return s, (left.conj() / np.sum(left.conj() * right, axis=0)).T, right
 
 
 def merged_eigenvalues(matrices: Complex) -> Complex:
@@ -310,8 +328,7 @@ def make_cluster(form: SchurForm, eigenvalues: Complex) -> Cluster:
 
     More: docs/explanation/jordan_chains.md
     """
-    from scipy.linalg import solve_sylvester
-    from scipy.linalg.lapack import ztrsen
+    from scipy.linalg.lapack import ztrsen, ztrsyl
 
     k, distances = len(eigenvalues), np.abs(np.diag(form.T)[:, None] - eigenvalues).min(axis=1)
     chosen = np.zeros(len(form.T), dtype=np.int32)
@@ -319,6 +336,6 @@ def make_cluster(form: SchurForm, eigenvalues: Complex) -> Cluster:
     T, Q, *_ = ztrsen(chosen, form.T, form.Q, job=b"N")
     block, left = T[:k, :k], Q.conj().T
     if k < len(T):
-        left = np.hstack([np.eye(k), solve_sylvester(block, -T[k:, k:], T[:k, k:])]) @ left
+        left = np.hstack([np.eye(k), ztrsyl(block, T[k:, k:], T[:k, k:], isgn=-1)[0]]) @ left
     mean = complex(np.trace(block)) / k
     return Cluster(mean, block - mean * np.eye(k), Q[:, :k], left[:k])

@@ -22,6 +22,7 @@ from tmsopt.problem import Posed, Starts, degrees_of_freedom
 from tmsopt.problem.quantities import ROOT_NAMES
 from tmsopt.problem.real_form import has_real_form
 from tmsopt.problem.solution import OtherBranch
+from tmsopt.problem.symmetry import find_symmetry
 from tmsopt.program import Options
 from tmsopt.program.chains import formulate_chains
 from tmsopt.program.formulate import default_start
@@ -86,6 +87,8 @@ def locate_by_chains(
         {**default_start(problem), **design}
         for design in (*extra_starts, *islice(sample_box(problem, options.seed), options.starts))
     )
+    if problem.model.is_complex and find_symmetry(problem).is_hermitian:  # then a few starts show where roots cross
+        options = replace(options, starts=min(options.starts, _MIN_STARTS))
     begin(options.progress, "searching", "start")
     found, start_count, end = list[_Found](), 0, None
     for start in chain([first], (_vector(problem, design) for design in further)):
@@ -173,7 +176,7 @@ def _is_same_objective(problem: Posed, outcome: Outcome, best: Outcome) -> bool:
 
 def _fail(problem: Posed, p: Array, start_count: int) -> Outcome | None:
     """The outcome if no start leads to a solution; None if the search by factors can follow."""
-    if has_real_form(problem.model):
+    if has_real_form(problem.model) and not find_symmetry(problem).is_hermitian:
         return None
     assert problem.pattern is not None
     design = problem.ordered(dict(zip(problem.free, p.tolist(), strict=True)))

@@ -13,7 +13,7 @@ from tmsopt.evaluation import missed_note, prove_worst_case
 from tmsopt.evaluation.bound import minimizes_abscissa
 from tmsopt.evaluation.digits import certified_numbers
 from tmsopt.evaluation.exclusion import bound_without_search
-from tmsopt.evaluation.recheck import Evaluation
+from tmsopt.evaluation.recheck import Evaluation, recheck
 from tmsopt.evaluation.stored import find_storable_design
 from tmsopt.models.user_spectrum import distance_beyond_axis
 from tmsopt.problem import (
@@ -129,7 +129,8 @@ def solve_any_status(
         and policy.local is POLICY.local
         and (outcome := locate_by_chains(problem, options, extra_starts))
     ):
-        return _assemble(problem, outcome, sense_notes(problem), {}, began, with_bound)
+        notes = (*sense_notes(problem), *_describe_hermitian(problem))
+        return _assemble(problem, outcome, notes, {}, began, with_bound)
     form = real_form(problem)
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
     solution = _search_box(form.problem, options, extra_starts, skipped_parts, with_bound, policy)
@@ -140,6 +141,12 @@ def solve_any_status(
     if form.problem is problem:
         return solution
     solution = form.to_user(solution, problem)
+    if solution.status == "optimal" and problem.pattern is not None:
+        checked = recheck(
+            problem, solution.parameters
+        )  # the polynomial of the real form has rounding errors of its own
+        if problem.pattern.name in checked.violations:
+            solution = replace(solution, status="not_converged", violations=checked.amounts)
     return replace(solution, notes=(*solution.notes, *_describe_hermitian(problem)))
 
 

@@ -24,7 +24,7 @@ def target(index: int, seed: int, searches: range = range(SEARCHES)) -> Target:
     found = [best_known(problem, number) for number in searches]
     best = min(found, key=lambda b: (not b.feasible, problem.posed.sign * b.value if b.feasible else b.violation))
     seconds = round(sum(b.seconds for b in found), 1)
-    return Target(index, hard_family(index), best.value, best.violation, best.design, best.how, seconds)
+    return Target(index, hard_family(index), best.value, best.violation, best.design, "evolution", seconds)
 
 
 def better(seed: int, one: Target, other: Target) -> Target:
