@@ -211,7 +211,8 @@ def eigenvectors_of(matrices: Complex) -> tuple[Complex, Complex, Complex]:
     if not np.isfinite(M).all():
         raise np.linalg.LinAlgError("the matrices are not finite")
     s, left, right = eig(M if M.imag.any() else M.real, left=True, right=True)
-    return s, (left.conj() / np.sum(left.conj() * right, axis=0)).T, right
+    with np.errstate(all="ignore"):
+        return s, (left.conj() / np.sum(left.conj() * right, axis=0)).T, right
 
 
 def merged_eigenvalues(matrices: Complex) -> Complex:
@@ -220,13 +221,11 @@ def merged_eigenvalues(matrices: Complex) -> Complex:
     At an exceptional point of order k computed eigenvalues are off by the k-th root of the rounding error, but not
     their mean.
     """
-    from scipy.linalg import eig
     from scipy.sparse.csgraph import connected_components
 
-    M = linearise(matrices)
-    s, left, right = eig(M, left=True)
-    conditions = 1 / np.maximum(np.abs(np.sum(left.conj() * right, axis=0)), 1e-300)
-    errors = float(np.linalg.norm(M, 2)) * np.minimum(_ROUNDING * conditions, _MAX_MERGED)
+    s, left, _ = eigenvectors_of(matrices)
+    conditions = np.nan_to_num(np.linalg.norm(left, axis=1), nan=np.inf)
+    errors = float(np.linalg.norm(linearise(matrices), 2)) * np.minimum(_ROUNDING * conditions, _MAX_MERGED)
     _, labels = connected_components(np.abs(s[:, None] - s) <= errors)
     is_same = labels[:, None] == labels
     means = is_same @ s / is_same.sum(axis=1)
