@@ -224,7 +224,7 @@ def merged_eigenvalues(matrices: Complex) -> Complex:
     from scipy.sparse.csgraph import connected_components
 
     s, left, _ = eigenvectors_of(matrices)
-    conditions = np.nan_to_num(np.linalg.norm(left, axis=1), nan=np.inf)
+    conditions = np.nan_to_num(np.abs(left).max(axis=1), nan=np.inf)
     errors = float(np.linalg.norm(linearise(matrices), 2)) * np.minimum(_ROUNDING * conditions, _MAX_MERGED)
     _, labels = connected_components(np.abs(s[:, None] - s) <= errors)
     is_same = labels[:, None] == labels
