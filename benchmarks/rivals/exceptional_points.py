@@ -61,7 +61,9 @@ class Earlier:
 
     def _start(self) -> None:
         environment = {**os.environ, "PYTHONPATH": str(self.checkout)}
-        self._process = subprocess.Popen([sys.executable, "-c", _SOLVER], cwd=self.checkout, env=environment, **_PIPES)
+        self._process: Any = subprocess.Popen(
+            [sys.executable, "-c", _SOLVER], cwd=self.checkout, env=environment, **_PIPES
+        )
         self._process.stdout.readline()
 
     def solve(self, system: System) -> Mapping[str, Any]:

@@ -6,7 +6,7 @@ solves the equations of the Jordan chain for the parameters and the eigenvalue, 
 so that conditions that a symmetry fulfils for all parameters do no harm.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -298,7 +298,7 @@ def _gather_eigenvalues(group: Complex, right: Complex = _NO_VECTORS, left: Comp
 
 
 def _separate(
-    clusters: Sequence[Cluster], targets: Sequence[Target], changes: Sequence[Complex], family: Family, size: float
+    clusters: Sequence[Cluster], targets: Sequence[Target], changes: Iterable[Complex], family: Family, size: float
 ) -> tuple[Array, Array]:
     """The power sums of clusters and their distances from the axes, in powers of `size`; and their derivatives."""
     residual, jacobian = list[Array](), list[Array]()
