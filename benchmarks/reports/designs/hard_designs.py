@@ -177,7 +177,7 @@ def parts(verdicts: Sequence[Verdict]) -> Iterator[str]:
         "seeds from differential evolution, all without the package. They count if they violate nothing by more than "
         f"1e-9 by isolated roots. Right is an optimum that is what it claims to be, within {SOLVED:.0e} of the best "
         f"known, relative to it or to {SCALE}; infeasible where no feasible design is known; no optimum, with a note, "
-        "where the best known has no bound or a singular mass matrix, or is surpassed. Times are those of the processor."
+        "where the best known has no bound or a singular mass matrix, or is surpassed. Times are CPU times."
     )
     names = dict.fromkeys(hard_family(i) for i in range(HARD_COUNT))
     rows = [
