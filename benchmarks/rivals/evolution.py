@@ -6,6 +6,7 @@ Feasible before infeasible, then by violation or objective.
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -57,12 +58,11 @@ def best_known(problem: Problem, seed: int = 0) -> Best:
     began, at = time.process_time(), Designs(problem)
     x, sign = np.zeros(0), problem.posed.sign
     for reach, band in _ZOOMS:
-        width = reach * (at.upper - at.lower)
+        width, slack = reach * (at.upper - at.lower), band if at.equalities else 0.0
         lower, upper = (at.lower, at.upper) if not x.size else (x - width, x + width)
         bounds = Bounds(np.maximum(lower, at.lower), np.minimum(upper, at.upper))
-        slack = band if at.equalities else 0.0
         near = np.clip(x, bounds.lb, bounds.ub) if x.size else None
-        x = _minimised(lambda x, slack=slack: at(x, slack).merit, bounds, seed, 300, popsize=20, tol=1e-12, x0=near)
+        x = _minimised(partial(_merit, at, slack), bounds, seed, 300, popsize=20, tol=1e-12, x0=near)
     design = dict(zip(at.names, x.tolist(), strict=True))
     ends = [(one.violation, one.value) for one in exactly(problem, design)]
     violation, value = min(ends, key=lambda end: (end[0] > MET, sign * end[1] if end[0] <= MET else end[0]))
@@ -101,6 +101,10 @@ class Followed:
     def reached(self, merit: float) -> float:
         """CPU seconds until a merit was met; inf if it never was."""
         return next((t for t, found in self.moments if found <= merit), float("inf"))
+
+
+def _merit(at: Designs, slack: float, x: Array) -> Array:
+    return at(x, slack).merit
 
 
 def evolve(problem: Problem, seed: int = 0) -> Evolved:

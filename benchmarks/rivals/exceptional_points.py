@@ -60,16 +60,25 @@ class Earlier:
         self._start()
 
     def _start(self) -> None:
-        environment = {**os.environ, "PYTHONPATH": str(self.checkout)}
-        self._process = subprocess.Popen([sys.executable, "-c", _SOLVER], cwd=self.checkout, env=environment, **_PIPES)
-        self._process.stdout.readline()
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _SOLVER],
+            cwd=self.checkout,
+            env={**os.environ, "PYTHONPATH": str(self.checkout)},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._calls, self._answers = self._process.stdin, self._process.stdout
+        self._answers.readline()
 
     def solve(self, system: System) -> Mapping[str, Any]:
         """Its status, and perhaps parameters, root and seconds."""
         told = {"matrices": system.matrices, "free": system.free, "locate": system.locate}
-        print(json.dumps(told), file=self._process.stdin, flush=True)
-        if select([self._process.stdout], [], [], self.seconds)[0]:
-            return dict(json.loads(self._process.stdout.readline()))
+        print(json.dumps(told), file=self._calls, flush=True)
+        if select([self._answers], [], [], self.seconds)[0]:
+            return dict(json.loads(self._answers.readline()))
         self.end()
         self._start()
         return {"status": "out of time", "seconds": self.seconds}
@@ -78,9 +87,6 @@ class Earlier:
         """End the process."""
         self._process.kill()
         self._process.wait()
-
-
-_PIPES: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
 
 
 def run_eastereig(python: str) -> list[Any]:

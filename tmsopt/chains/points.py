@@ -6,7 +6,7 @@ solves the equations of the Jordan chain for the parameters and the eigenvalue, 
 so that conditions that a symmetry fulfils for all parameters do no harm.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -188,7 +188,7 @@ def refine_near(family: Family, targets: Sequence[Target], p: Array) -> Exceptio
 def gather_roots(family: Family, targets: Sequence[Target]) -> tuple[complex, ...] | None:
     """The means of the eigenvalues that come nearest to the targets, for a family without parameters."""
     try:
-        groups = _choose_groups(eigenvalues_of(family.matrices(np.empty(0))), targets, family, _spread)
+        groups = _choose_groups(eigenvalues_of(family.matrices(np.empty(0))), targets, family, _measure_spread)
     except np.linalg.LinAlgError:
         return None
     means = [complex(group.mean()) for group in groups if group is not None]
@@ -248,7 +248,7 @@ def _gather(
         rest = residual + jacobian @ (family.widths * step)
         return float(np.linalg.norm(step) + np.linalg.norm(rest) / np.linalg.norm(residual))
 
-    groups = _choose_groups(s, targets, family, predict_step if family.names else _spread, rng)
+    groups = _choose_groups(s, targets, family, predict_step if family.names else _measure_spread, rng)
     state = _measure(family, start, targets, groups, size)
     errors = list[float]()
     while state and state.steps < _MAX_CLUSTER_STEPS:
@@ -298,7 +298,7 @@ def _gather_eigenvalues(group: Complex, right: Complex = _NO_VECTORS, left: Comp
 
 
 def _separate(
-    clusters: Sequence[Cluster], targets: Sequence[Target], changes: Sequence[Complex], family: Family, size: float
+    clusters: Sequence[Cluster], targets: Sequence[Target], changes: Iterable[Complex], family: Family, size: float
 ) -> tuple[Array, Array]:
     """The power sums of clusters and their distances from the axes, in powers of `size`; and their derivatives."""
     residual, jacobian = list[Array](), list[Array]()
@@ -342,7 +342,7 @@ def _choose_groups(
     return [groups[k] for k in range(len(targets))]
 
 
-def _spread(group: Complex, target: Target) -> float:
+def _measure_spread(group: Complex, target: Target) -> float:
     """Largest distance of an eigenvalue of a group from the mean, with the distance of the mean from its axis."""
     return float(np.abs(group - group.mean()).max() + abs(_stack(group.mean(), _NO_SUMS, target)[0]))
 

@@ -173,11 +173,11 @@ def parts(verdicts: Sequence[Verdict]) -> Iterator[str]:
         ]
     )
     yield (
-        "References come from samples, differential evolution and SLSQP on eigenvalues, without the package, and count "
-        "if they violate nothing by more than 1e-9 by isolated roots. Right is an optimum that is what it claims to "
-        f"be, within {SOLVED:.0e} of the best known, relative to it or to {SCALE}; infeasible where no feasible design "
-        "is known; no optimum, with a note, where the best known has no bound or a singular mass matrix, or is "
-        "surpassed. Times are those of the processor."
+        "References of seeds 1 to 3 come from samples, differential evolution and SLSQP on eigenvalues, those of other "
+        "seeds from differential evolution, all without the package. They count if they violate nothing by more than "
+        f"1e-9 by isolated roots. Right is an optimum that is what it claims to be, within {SOLVED:.0e} of the best "
+        f"known, relative to it or to {SCALE}; infeasible where no feasible design is known; no optimum, with a note, "
+        "where the best known has no bound or a singular mass matrix, or is surpassed. Times are CPU times."
     )
     names = dict.fromkeys(hard_family(i) for i in range(HARD_COUNT))
     rows = [

@@ -100,8 +100,10 @@ def _timed(system: matrices.System) -> tuple[Solution, float]:
 
 def _row(system: matrices.System, worker: _Worker) -> Row:
     answer = worker.call(_timed, system)
-    found, seconds = (answer, worker.seconds) if isinstance(answer, str) else answer
-    row = Row(system, found if isinstance(found, str) else found.status, seconds)
+    if isinstance(answer, str):
+        return Row(system, answer, worker.seconds)
+    found, seconds = answer
+    row = Row(system, found.status, seconds)
     if row.status != "optimal":
         return row
     if system.points:
