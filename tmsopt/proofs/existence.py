@@ -311,7 +311,7 @@ def _other_kind(pattern: Pattern) -> str:
 
 
 def _undecided_kind(pattern: Pattern) -> str:
-    if pattern.form in ("2EP2", "CEP2") and not pattern.doubles:
+    if pattern.form in ("2EP2", "CEP2") and not pattern.real_name:
         return "b² − 4c may be 0, which leaves 2EP2, CEP2 and EP4 undecided; locate EP4, with one more free parameter"
     if _needs_discriminant(pattern):
         return f"b² − 4c may be 0, which leaves {pattern.name} undecided; locate the pattern in which the roots meet"

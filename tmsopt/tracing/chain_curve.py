@@ -266,7 +266,7 @@ def prepare_chains(problem: Posed, pattern: Pattern) -> ChainSetup:
         for n in _name_parts(np.zeros(1, dtype=complex), t, family.is_complex)
     )
     bare = replace(
-        pattern, unknowns=names, factors=lambda u: [], rest=None, test=None, marks={}, ends={}, doubles=pattern.form
+        pattern, unknowns=names, factors=lambda u: [], rest=None, test=None, marks={}, ends={}, real_name=pattern.form
     )
     setup = ChainSetup(problem, bare, curve, family, targets, centres, unit)
     return setup

@@ -1,8 +1,7 @@
 """Patterns and structures of a complex matrix H, converted to and from the real system of twice the size.
 
 An eigenvalue of H corresponds to a complex pair of roots of the real system, so an EPn of H is a CEPn of the real
-system. This requires that no root meets the conjugate of another root. The carrier ensures it: a real constant that is
-added to all eigenfrequencies of H.
+system, if no root meets the conjugate of another root (see `tmsopt.problem.real_form`).
 """
 
 import re
@@ -64,7 +63,7 @@ def as_complex_pattern(real_pattern: Pattern) -> Pattern:
     words = words.replace("complex double", "double complex")
     words = re.sub(r"(complex )?pair(s?)", lambda m: "eigenfrequencies" if m[2] else "eigenfrequency", words)
     return replace(
-        real_pattern, name=complex_name(real_pattern.name), meaning=words, marks={}, doubles=real_pattern.form
+        real_pattern, name=complex_name(real_pattern.name), meaning=words, marks={}, real_name=real_pattern.form
     )
 
 

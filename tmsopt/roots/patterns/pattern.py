@@ -45,7 +45,7 @@ class Pattern:
         marks: name of a more special pattern → expression of the unknowns that is 0 on it.
         ends: unknown → event where it reaches 0 and the pattern ends.
         degree: degree of the polynomials.
-        doubles: for a pattern of a complex matrix, the name of the same pattern of the real system of twice the size.
+        real_name: for a pattern of a complex matrix, the name of the same pattern of the real system of twice the size.
 
     Example:
         >>> tmsopt.roots.pattern("EP3", 4).monic([-1, -2])  # (s + 1)³ (s + 2)
@@ -66,12 +66,12 @@ class Pattern:
     marks: Mapping[str, Callable[[Sequence[Any]], Any]] = field(default_factory=dict)
     ends: Mapping[str, str] = field(default_factory=dict)
     degree: int = 4
-    doubles: str = ""
+    real_name: str = ""
 
     @property
     def form(self) -> str:
         """Name of the pattern of the real polynomial with these factors."""
-        return self.doubles or self.name
+        return self.real_name or self.name
 
     @property
     def codimension(self) -> int:
@@ -111,7 +111,7 @@ class Pattern:
     def kind(self, unknowns: Sequence[Any]) -> NDArray[np.str_]:
         """Name of the pattern at each point. 2EP2 and CEP2 form one set; the sign of b² − 4c distinguishes them."""
         base_name = self.name.removeprefix("2").removeprefix("C")
-        if self.doubles or self.name not in (f"2{base_name}", f"C{base_name}"):
+        if self.real_name or self.name not in (f"2{base_name}", f"C{base_name}"):
             return np.full(np.shape(unknowns[0]), self.name, dtype=_NAME_TYPE)
         b, c = unknowns[:2]
         return np.where(b * b - 4 * c >= 0, f"2{base_name}", f"C{base_name}").astype(_NAME_TYPE)
