@@ -167,12 +167,14 @@ locate = "CEP2"
 @pytest.mark.slow
 def test_a_continuum_of_solutions_is_told_from_none():
     """s⁴ + (Om² − 1 − k) s² + k: both pairs meet wherever Om = 1 + √k, a whole curve, for there is no damping."""
-    Om, k = ca.SX.sym("Om"), ca.SX.sym("k")
-    model = from_matrices([[1, 0], [0, 1]], [[0, -Om], [Om, 0]], [[-1, 0], [0, -k]])
-    problem = tmsopt.Problem(model=model, free={"Om": (0.5, 6.0), "k": (0.5, 3.0)}, locate="CEP2")
-    every = tmsopt.solve_all(problem, starts=8, seconds=0)
+    free = {"Om": (0.5, 6.0), "k": (0.5, 3.0)}
+    model = from_coefficients([1, 0, "Om**2 - 1 - k", 0, "k"])
+    every = tmsopt.solve_all(tmsopt.Problem(model, free=free, locate="CEP2"), starts=8, seconds=0)
     assert not every.solutions
     assert every.coverage.singular > 0
+    model = from_matrices([[1, 0], [0, 1]], [[0, "-Om"], ["Om", 0]], [[-1, 0], [0, "-k"]])
+    with pytest.raises(tmsopt.InputError, match="1 by symmetry do not give isolated solutions; free fewer"):
+        tmsopt.solve_all(tmsopt.Problem(model, free=free, locate="CEP2"))
 
 
 @pytest.mark.slow

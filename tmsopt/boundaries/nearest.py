@@ -291,7 +291,7 @@ def _find_nearest(
     best = min([EdgePoint(), *ends], key=lambda end: end.distance)
     if edge_crossings and edge_crossings[0].distance < best.distance * (1 - SAME_DISTANCE):
         best = EdgePoint(edge_crossings[0].u, False)
-    points = [best, *(EdgePoint(crossing.u, False) for crossing in edge_crossings[:1])]
+    points = [best, *(EdgePoint(crossing.u, False) for crossing in edge_crossings[: 1 - is_damping])]
     best = next((e for e in points if e.u.size and is_boundary(base, e.u, is_damping)), EdgePoint())
     if not best.u.size:
         return Nearest(kind)
