@@ -6,6 +6,6 @@ from .meetings import (
 )
 from .points import (
     Axis as Axis, ExceptionalPoint as ExceptionalPoint, Target as Target, find_point as find_point,
-    measure_point as measure_point,
+    measure_point as measure_point, raise_order as raise_order,
     refine as refine, refine_near as refine_near, targets_of as targets_of,
 )

@@ -7,6 +7,7 @@ so that conditions that a symmetry fulfils for all parameters do no harm.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -49,6 +50,8 @@ _STILL = 4e-16  # a step of this share of the ranges, and an error of this size,
 _ROUNDING = 32 * float(np.finfo(float).eps)  # of the equations, relative to their terms
 _CUTOFF = 1e-10  # relative singular values below this count as 0 in a step
 _MAX_STEP = 0.5  # longest step of a parameter in the second stage, as a share of its range
+_SMALL = 1e-3  # an equation beyond those of a chain may hold nearby if its value is below this share of the matrices
+_SAME_POINT = 1e-5  # relative to each range: how near a point of a higher order must be
 _DISTINCT = 1e-6  # relative distance below which two eigenvalues of a pattern are one
 
 _NO_SUMS = np.zeros(0, dtype=complex)
@@ -105,6 +108,7 @@ class ExceptionalPoint:
         sensitivity: largest effect on each parameter of a relative change of the equations; inf if the equations do
             not determine the parameters.
         steps: steps of the two stages.
+        has_higher_order: whether more eigenvalues coincide than were asked for; then the chains have the higher order.
     """
 
     p: Array
@@ -113,6 +117,7 @@ class ExceptionalPoint:
     second_value: float
     sensitivity: Array
     steps: tuple[int, int] = (0, 0)
+    has_higher_order: bool = False
 
     @property
     def roots(self) -> tuple[complex, ...]:
@@ -173,7 +178,29 @@ def find_point(
             if point.is_found or not state.is_close:
                 break
             point = replace(point, p=p)
+        if point is not None and point.is_found:
+            climbs = (raise_order(family, targets, k, point)[1] for k in range(len(targets)))
+            return next((replace(p, has_higher_order=True) for p in climbs if p is not point), point)
         return point
+
+
+def raise_order(
+    family: Family, targets: Sequence[Target], k: int, point: ExceptionalPoint
+) -> tuple[Sequence[Target], ExceptionalPoint]:
+    """The targets and the point, with the order of the k-th target raised as long as more eigenvalues coincide there.
+
+    By a symmetry, an EP2 may exist only as an EP3.
+    """
+    chain = point.chains[k]
+    if abs(chain.values[-1]) * chain.unit**chain.order > _SMALL * size_at(family.matrices(point.p), chain.s):
+        return targets, point
+    for more in (1, 2):  # beside an EP4, the equations of an EP3 converge slowly
+        higher = [replace(t, order=t.order + more * (i == k)) for i, t in enumerate(targets)]
+        with suppress(np.linalg.LinAlgError):
+            found = refine(family, higher, point.p, point.roots)
+            if found.is_found and np.all(np.abs(found.p - point.p) <= _SAME_POINT * family.widths):
+                return raise_order(family, higher, k, found)
+    return targets, point
 
 
 def refine_near(family: Family, targets: Sequence[Target], p: Array) -> ExceptionalPoint | None:

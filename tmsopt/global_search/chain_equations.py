@@ -343,6 +343,8 @@ def prove_point(problem: Posed, parameters: Numbers) -> Enclosure | None:
         exact = {n: flint.arb(x) for n, x in problem.exactly(problem.ordered(parameters)).items()}
         try:
             system = build_chain_equations(problem, problem.pattern, parameters)
+            if system.condition_count != len(problem.free):
+                return None
             names = [*problem.free, *system.unknowns]
             start = {**exact, **next(system.start_values())}
             middle = refine_solution(system, start, names, _PROOF_DIGITS, system.units)

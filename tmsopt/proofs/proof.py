@@ -11,6 +11,7 @@ import flint
 from tmsopt.algebra.balls import Number, ProvedRoot, fraction, number
 from tmsopt.algebra.krawczyk import ProofFailed
 from tmsopt.errors import Fault, InputError, count_faults
+from tmsopt.global_search.chain_equations import has_chain_proof
 from tmsopt.models.exact import ExactDesign, as_exact_design
 from tmsopt.models.names import number_text
 from tmsopt.models.user_spectrum import pattern_of
@@ -279,7 +280,7 @@ def _candidate_patterns(problem: Posed, structure: str, roots: Sequence[Root]) -
         patterns = []
     user_patterns = [quartic.get(p.name, p) for p in patterns]
     if problem.model.is_complex:
-        user_patterns = [as_complex_pattern(p) for p in user_patterns]
+        user_patterns = [p for p in map(as_complex_pattern, user_patterns) if has_chain_proof(problem, p.name)]
     return list({p.name: p for p in [*user_patterns, *([target] if target else [])]}.values())
 
 

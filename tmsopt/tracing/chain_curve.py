@@ -13,7 +13,7 @@ from itertools import combinations
 import casadi as ca
 import numpy as np
 
-from tmsopt.chains import Family, Target, family_of, find_point, is_crossing, nearest_crossing, targets_of
+from tmsopt.chains import Family, Target, family_of, find_point, is_crossing, nearest_crossing, raise_order, targets_of
 from tmsopt.chains.points import chain_equations, project_on_axis, refine
 from tmsopt.errors import input_error
 from tmsopt.models import Values
@@ -111,7 +111,7 @@ class ChainSetup:
         """A point of the curve near a design, perhaps outside the limits; None if the search fails."""
         start = np.array([float(design[n]) for n in self.family.names])
         found = find_point(self.family, self.targets, start, rng, is_nearest=False)
-        if found is None or not found.is_found:
+        if found is None or not found.is_found or found.has_higher_order:
             return None
         y = self.join(found.p, found.roots)
         if any(c.equality for c in self.problem.conditions.values()):
@@ -136,16 +136,13 @@ class ChainSetup:
             for row in _find_minima(heights):
                 starts = [complex(roots[row, places.index(i)]) for i in range(len(targets))]
                 k = next(k for k, t in enumerate(targets) if t not in self.targets)
-                p, wanted, best = self.split(y[row])[0], targets, None
                 with suppress(np.linalg.LinAlgError):
-                    while (found := refine(self.family, wanted, p, starts)).is_found:
+                    found = refine(self.family, targets, self.split(y[row])[0], starts)
+                    point = self.join(found.p, [found.roots[i] for i in places])
+                    if found.is_found and np.abs(point - y[row]).max() <= _REACH:
+                        met, found = raise_order(self.family, targets, k, found)
                         point = self.join(found.p, [found.roots[i] for i in places])
-                        if np.abs(point - y[row]).max() > _REACH:
-                            break
-                        best, p, starts = (wanted[k], point), found.p, list(found.roots)
-                        wanted = [replace(t, order=t.order + (i == k)) for i, t in enumerate(wanted)]
-                if best:  # the highest order
-                    yield name_target(best[0], self.family.is_complex), best[1]
+                        yield name_target(met[k], self.family.is_complex), point
         for row in _find_minima(sizes[:, -1]):
             p, s = self.split(y[row])
             design = self.problem.ordered(dict(zip(self.family.names, p.tolist(), strict=True)))

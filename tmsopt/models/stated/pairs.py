@@ -99,7 +99,9 @@ def join(re: Any, im: Any) -> Any:
 
 def is_complex_entry(x: Any) -> bool:
     """Whether an entry as the user wrote it is complex: a number, a pair, or a text with 1j."""
-    return isinstance(x, complex | np.complexfloating | tuple) or (isinstance(x, str) and replace_literals(x) != x)
+    return isinstance(x, complex | np.complexfloating | tuple | Pair) or (
+        isinstance(x, str) and replace_literals(x) != x
+    )
 
 
 def list_parts(matrices: Iterable[Iterable[Iterable[Any]]]) -> list[Any]:
