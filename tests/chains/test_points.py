@@ -281,3 +281,27 @@ def test_an_exceptional_point_next_to_a_diabolic_one(start):
     assert point.is_found
     assert np.abs(point.p) == pytest.approx((g * s, g * c), rel=1e-6)
     assert point.p[0] * point.p[1] < 0
+
+
+@pytest.mark.parametrize(
+    ("H", "order", "g"),
+    [
+        ([["1j*g", 1, 0], [1, 0, 1], [0, 1, "-1j*g"]], 3, 2**0.5),  # ω (ω² + g² − 2)
+        (spin(4), 4, 1.0),
+    ],
+)
+def test_where_a_symmetry_makes_the_order_higher_the_point_has_the_higher_order(H, order, g):
+    """There is no EP2: all eigenfrequencies coincide at once. Computed ones are off by 1e-5 and 3e-4 there."""
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(H), free={"g": (0.0, 2.0)}, locate="EP2"))
+    assert found.parameters["g"] == pytest.approx(g, abs=EXACT)
+    assert found.structure == f"EP{order}"
+
+
+def test_a_singular_mass_leaves_the_polynomial():
+    """(s² + c s + 1)(s + 1) = 0.3² has a double root at c = 2.274895, s = −1.407904."""
+    model = from_matrices(M=[[1, 0], [0, 0]], D=[["c", 0], [0, 1]], K=[[1, 0.3], [0.3, 1]])
+    found = tmsopt.solve(tmsopt.Problem(model, free={"c": (0, 5)}, locate="EP2"))
+    c = found.parameters["c"]
+    roots = np.roots(np.polysub(np.polymul([1, c, 1], [1, 1]), [0.09]))  # (s² + c s + 1)(s + 1) − 0.3²
+    assert sorted(np.abs(np.diff(np.sort_complex(roots))))[0] <= 1e-6
+    assert tmsopt.prove(found).proved

@@ -1,8 +1,8 @@
 from .discriminant import Discriminant as Discriminant, find_discriminant as find_discriminant
 from .family import Family as Family, family_of as family_of
 from .meetings import (
-    all_meetings as all_meetings, is_crossing as is_crossing, located_meetings as located_meetings,
-    meetings as meetings, nearest_crossing as nearest_crossing,
+    all_meetings as all_meetings, has_regular_lead as has_regular_lead, is_crossing as is_crossing,
+    located_meetings as located_meetings, meetings as meetings, nearest_crossing as nearest_crossing,
 )
 from .points import (
     Axis as Axis, ExceptionalPoint as ExceptionalPoint, Target as Target, find_point as find_point,

@@ -55,6 +55,12 @@ def mismatch(problem: Posed, pattern: Pattern, parameters: Numbers) -> float:
     return point.backward_error if point is not None and point.is_defective else np.inf
 
 
+def has_regular_lead(problem: Posed, parameters: Numbers) -> bool:
+    """Whether the matrix of the highest power of s is regular, as Jordan chains need it."""
+    leading = family_of(problem, parameters).matrices(np.array([float(parameters[n]) for n in problem.free]))[0]
+    return bool(np.isfinite(leading).all() and np.linalg.matrix_rank(leading) == len(leading))
+
+
 def located_meetings(problem: Posed, pattern: Pattern, parameters: Numbers) -> tuple[MultipleRoot, ...]:
     """The multiple roots of a pattern; none without matrices."""
     if problem.model.pencil is None:

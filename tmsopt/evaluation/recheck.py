@@ -12,7 +12,7 @@ from tmsopt.algebra.formula import Formula, UnsupportedOperation, formula, symbo
 from tmsopt.algebra.intervals import ranges
 from tmsopt.algebra.kinds import gradients
 from tmsopt.boundaries.nearest import Robustness, find_stability_margins
-from tmsopt.chains.meetings import is_crossing, mismatch
+from tmsopt.chains.meetings import has_regular_lead, is_crossing, mismatch
 from tmsopt.models import Model, Values
 from tmsopt.models.expression import Expression
 from tmsopt.problem.cases import Case
@@ -78,7 +78,9 @@ def recheck(
         # a singular mass matrix, or undefined coefficients
         violations["a0" if are_finite else "coefficients"] = 1.0
     if problem.pattern is not None:
-        if problem.model.statement is not None and problem.model.pencil is not None:
+        model = problem.model
+        has_chains = model.statement is not None and model.pencil is not None
+        if has_chains and (model.polynomial is None or has_regular_lead(problem, parameters)):
             distance = mismatch(problem, problem.pattern, parameters)
             crosses = not distance <= _PATTERN_TOLERANCE and is_crossing(problem, problem.pattern, parameters)
         else:

@@ -11,6 +11,7 @@ import flint
 
 from tmsopt.algebra.balls import GUARD_DIGITS, largest_radius, upper_bound
 from tmsopt.algebra.krawczyk import Enclosure, ProofFailed, enclose_solution, refine_solution
+from tmsopt.chains import has_regular_lead
 from tmsopt.global_search.chain_equations import ChainEquations, build_chain_equations, has_chain_proof
 from tmsopt.models.exact import ExactDesign
 from tmsopt.models.user_spectrum import pattern_of
@@ -101,7 +102,7 @@ def prove_nearby(
     """
     working_digits = digits + _EXTRA_DIGITS
     system: AnyEquations
-    if has_chain_proof(problem, pattern.name):
+    if has_chain_proof(problem, pattern.name) and has_regular_lead(problem, stored_values):
         changed = set(design.given_exactly) & set(problem.fixed) - set(problem.typed(stored_values))
         system = build_chain_equations(problem, pattern, stored_values, uses_symmetry=not changed)
     else:

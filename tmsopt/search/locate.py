@@ -12,6 +12,7 @@ from tmsopt.chains import (
     Target,
     family_of,
     find_point,
+    has_regular_lead,
     measure_point,
     nearest_crossing,
     refine_near,
@@ -87,6 +88,8 @@ def locate_by_chains(
         {**default_start(problem), **design}
         for design in (*extra_starts, *islice(sample_box(problem, options.seed), options.starts))
     )
+    if problem.model.polynomial is not None and not has_regular_lead(problem, default_start(problem)):
+        return None
     if problem.model.is_complex and find_symmetry(problem).is_hermitian:  # then a few starts show where roots cross
         options = replace(options, starts=min(options.starts, _MIN_STARTS))
     begin(options.progress, "searching", "start")
