@@ -340,3 +340,20 @@ def test_coefficients_cannot_tell():
     found = tmsopt.solve(tmsopt.Problem(swing, free={"c": (0.0, 3.0)}, locate="EP2"))
     assert found.to_json()["defective"] is None
     assert "coefficients cannot tell" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("table", "condition"),
+    [
+        ('A = [["x + 1j*y", 1], ["0.3j", "-1 - 0.5j"]]', lambda z: (z + 1 + 0.5j) ** 2 + 4 * 0.3j),
+        ('M = [["1"]]\nD = [["x + 1j*y"]]\nK = [["2 + 1j"]]', lambda z: z**2 - 4 * (2 + 1j)),
+        ('coefficients = ["1", "x + 1j*y", "2 + 1j"]', lambda z: z**2 - 4 * (2 + 1j)),
+    ],
+)
+def test_complex_entries_in_a_file(tmp_path, table, condition):
+    """A double eigenvalue by the discriminant of the quadratic polynomial."""
+    path = tmp_path / "complex.toml"
+    ranges = "x = { min = -4, max = 4 }\ny = { min = -4, max = 4 }"
+    path.write_text(f'[model]\n{table}\n[parameters]\n{ranges}\n[objective]\nlocate = "EP2"\n')
+    found = tmsopt.solve(path)
+    assert abs(condition(complex(found.parameters["x"], found.parameters["y"]))) < EXACT
