@@ -39,6 +39,7 @@ from tmsopt.search.all_designs import Coverage, Every
 if TYPE_CHECKING:
     from tmsopt.problem import Solution
 
+_MAX_ERROR = 1e-3  # of a parameter in the list of designs, as a share of its range
 _FACTOR_COEFFICIENT = re.compile(r"(.*\.)?[bcdW]\d+")
 """Names of coefficients of factors. Documents list the roots of the factors instead."""
 
@@ -216,7 +217,8 @@ def _list_designs(result: Every, is_complete: bool) -> list[Row]:
     pairs = [*zip(solutions, result.errors or [{} for _ in solutions], strict=True)]
     units = [unit_at(problem, "abscissa", s.parameters) for s in solutions]
     rows: list[Row] = [(problem.model.noun, *(str(k) for k in range(1, len(solutions) + 1)))]
-    rows += [(n, *(Cell(s.parameters[n], error=e.get(n, 0.0)) for s, e in pairs)) for n in names]
+    most = {n: _MAX_ERROR * (hi - lo) for n, (lo, hi) in problem.free.items()}
+    rows += [(n, *(Cell(s.parameters[n], error=min(e.get(n, 0.0), most[n])) for s, e in pairs)) for n in names]
     abscissas = [Cell(s.abscissa, u, error=e.get("abscissa", 0.0)) for (s, e), u in zip(pairs, units, strict=True)]
     rows += [(f"abscissa {units[0].text}".rstrip(), *abscissas), ("structure", *(s.structure for s in solutions))]
     rows += [("starts that reached it", *map(str, result.coverage.hits))] if result.coverage else []
