@@ -305,3 +305,9 @@ def test_a_singular_mass_leaves_the_polynomial():
     roots = np.roots(np.polysub(np.polymul([1, c, 1], [1, 1]), [0.09]))  # (s² + c s + 1)(s + 1) − 0.3²
     assert sorted(np.abs(np.diff(np.sort_complex(roots))))[0] <= 1e-6
     assert tmsopt.prove(found).proved
+
+
+def test_an_ep2_in_small_units_is_defective():
+    dimer = from_hamiltonian([["1e-9j*g", 1e-9], [1e-9, "-1e-9j*g"]])
+    (diagnosis,) = tmsopt.diagnose(tmsopt.solve(tmsopt.Problem(dimer, free={"g": (0.1, 3.0)}, locate="EP2")))
+    assert (diagnosis.geometric, diagnosis.kind) == (1, "defective")

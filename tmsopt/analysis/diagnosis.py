@@ -123,7 +123,9 @@ def diagnose(design: ProblemSource, *, progress: Listener | None = None) -> tupl
         structure_at_design = replace(
             structure, distance=float(backward_error([float(c) for c in values.coefficients], z))
         )
-    return diagnose_roots(problem.model, problem.parameter_set, parameters, structure_at_design, problem.free)
+    has_size = problem.model.pencil is not None and problem.free
+    least = family_of(problem).typical_size if has_size and problem.model.is_complex else 0.0
+    return diagnose_roots(problem.model, problem.parameter_set, parameters, structure_at_design, problem.free, least)
 
 
 def diagnose_roots(
@@ -132,10 +134,12 @@ def diagnose_roots(
     design: Numbers,
     structure: Structure,
     free: Mapping[str, tuple[float, float]] | None = None,
+    least: float = 0.0,
 ) -> tuple[Diagnosis, ...]:
     """Diagnose the multiple roots of a design whose roots have a known structure.
 
     Args:
+        least: lower limit of the unit of eigenvalues, see `jordan`.
         free: ranges of free parameters. A value that is tiny compared with its range may be a rounded 0.
     """
     matrices = evaluate_matrices(model, parameter_set, design).astype(complex)
@@ -151,7 +155,7 @@ def diagnose_roots(
         threshold = max(_ZERO_SINGULAR_VALUE, _DISTANCE_FACTOR * math.sqrt(structure.distance))
         if not is_regular(matrices, point.s, threshold):
             return None
-        return jordan(matrices, point.s, point.multiplicity, threshold)
+        return jordan(matrices, point.s, point.multiplicity, threshold, least)
 
     with high_precision():
         for root in structure.roots:
