@@ -306,7 +306,7 @@ def test_all_designs_count_crossings_apart():
     assert not every.solutions
     assert every.coverage is not None
     assert every.coverage.crossings == every.coverage.starts
-    assert "diabolic point" in str(every)
+    assert "8 starts ended where a multiple eigenvalue has several eigenvectors" in str(every)
 
 
 @pytest.mark.parametrize(("coupling", "proved"), [("0", False), ("1", True)])

@@ -31,7 +31,6 @@ from tmsopt.models.user_spectrum import pattern_of
 from tmsopt.problem import unit_at
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.unit_system import round_one_way, units_of
-from tmsopt.problem.verdict.stability import CROSSING
 from tmsopt.proofs.facts import NOT_CHECKED, Verdict
 from tmsopt.proofs.proof import Proof
 from tmsopt.search.all_designs import Coverage, Every
@@ -240,11 +239,9 @@ def _describe_proof(proof: Completeness, effort: str) -> Iterator[str]:
 
 def _describe_coverage(coverage: Coverage) -> Iterator[str]:
     if coverage.crossings:
-        yield f"{coverage.crossings} starts ended at designs whose roots meet in a {CROSSING}"
-    singular_text = (
-        f"; {coverage.singular} ended at designs with the pattern where its equations are singular, because "
-    )
-    singular_text += "the solutions form a continuum or two of them meet (tmsopt solve shows such a design)"
+        yield f"{coverage.crossings} starts ended where a multiple eigenvalue has several eigenvectors: no EP"
+    singular_text = f"; {coverage.singular} ended where the equations of the pattern are singular, because "
+    singular_text += "the solutions form a continuum or two of them meet (tmsopt solve shows one)"
     yield (
         f"coverage of a search: {coverage.starts} starts over the ranges{singular_text if coverage.singular else ''}; "
         f"{coverage.expected:.2f} solutions are expected in total; "
