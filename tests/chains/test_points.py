@@ -10,7 +10,6 @@ import tmsopt
 from tmsopt.chains import family_of, find_discriminant, find_point, measure_point, targets_of
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
 from tmsopt.problem import find_symmetry
-from tmsopt.search.all_points import prove_all_points
 
 EXACT = 1e-14  # some roundings
 
@@ -312,14 +311,6 @@ def test_an_ep2_in_small_units_is_defective():
     dimer = from_hamiltonian([["1e-9j*g", 1e-9], [1e-9, "-1e-9j*g"]])
     (diagnosis,) = tmsopt.diagnose(tmsopt.solve(tmsopt.Problem(dimer, free={"g": (0.1, 3.0)}, locate="EP2")))
     assert (diagnosis.geometric, diagnosis.kind) == (1, "defective")
-
-
-def test_double_zeros_of_the_discriminant_are_no_complete_list():
-    """The eigenvalues z, 2 z and 1 meet at z = 0, 1/2 and 1, where the discriminant has double zeros: 3 points, degree 6."""
-    H = [["x + 1j*y", 1, 0], [0, "2*(x + 1j*y)", 1], [0, 0, 1]]
-    problem = tmsopt.Problem(from_hamiltonian(H), free={"x": (-3, 3), "y": (-3, 3)}, locate="EP2")
-    assert find_discriminant(problem.posed).degree == 6
-    assert prove_all_points(problem.posed) is None
 
 
 def test_a_part_alone_makes_no_symmetry():

@@ -242,3 +242,10 @@ def test_all_EP2_of_a_dimer_in_any_unit(rate):
     every = tmsopt.solve_all(tmsopt.Problem(dimer, fixed={"g1": 3 * rate, "g2": rate}, free=free, locate="EP2"))
     assert every.complete
     assert [s.parameters["k"] / rate for s in every.solutions] == [pytest.approx(1, rel=1e-12)]
+
+
+def test_double_zeros_of_the_discriminant_are_no_complete_list():
+    """The eigenvalues z, 2 z and 1 meet at z = 0, 1/2 and 1, where the discriminant has double zeros: 3 points, degree 6."""
+    H = [["x + 1j*y", 1, 0], [0, "2*(x + 1j*y)", 1], [0, 0, 1]]
+    problem = tmsopt.Problem(from_hamiltonian(H), free={"x": (-3, 3), "y": (-3, 3)}, locate="EP2")
+    assert not tmsopt.solve_all(problem, starts=4, seconds=1).complete
