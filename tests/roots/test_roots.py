@@ -11,6 +11,7 @@ import sympy
 from helpers.oracles import routh_exact
 from hypothesis import given, settings, strategies as st
 
+import tmsopt
 from tmsopt.roots import (
     abscissa,
     backward_error,
@@ -321,3 +322,11 @@ def test_the_boundary_is_not_stable(unstable):
 def test_is_stable_is_vectorised():
     c = np.array([[[1, 2, 3], [-1, -2, -3]], [[1, -2, 3], [1, 2, -3]]])
     assert is_stable(c).tolist() == [[True, True], [False, False]]
+
+
+@pytest.mark.parametrize("distance", [1e-6, 1e-4])
+def test_three_eigenvalues_at_equal_distances_are_no_triple_one(distance):
+    """The squares of the distances from their mean add up to 0, the cubes do not."""
+    around = 0.5 + distance * np.exp(2j * np.pi * np.arange(3) / 3)
+    matrices = np.array([np.eye(4), -np.diag([*around, -1])])
+    assert [root.multiplicity for root in tmsopt.roots.spectrum(matrices, 1e-12, is_complex=True).roots] == [1] * 4

@@ -249,3 +249,10 @@ def test_double_zeros_of_the_discriminant_are_no_complete_list():
     H = [["x + 1j*y", 1, 0], [0, "2*(x + 1j*y)", 1], [0, 0, 1]]
     problem = tmsopt.Problem(from_hamiltonian(H), free={"x": (-3, 3), "y": (-3, 3)}, locate="EP2")
     assert not tmsopt.solve_all(problem, starts=4, seconds=1).complete
+
+
+def test_a_mode_on_its_own_crosses_and_is_no_point():
+    """±√(1 − g²) coincide at g = 1; one of them is 1/2 at g = √3/2, where the third mode keeps its own eigenvector."""
+    H = [["1j*g", 1, 0], [1, "-1j*g", 0], [0, 0, 0.5]]
+    every = tmsopt.solve_all(tmsopt.Problem(from_hamiltonian(H), free={"g": (0.1, 2.0)}, locate="EP2"))
+    assert [s.parameters["g"] for s in every.solutions] == [1.0]
