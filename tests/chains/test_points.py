@@ -1,15 +1,20 @@
 """Exceptional points of matrices by Jordan chains: where they are in closed form, and where there are none."""
 
 import math
+from dataclasses import replace
+from importlib import import_module
 
 import flint
 import numpy as np
 import pytest
 
 import tmsopt
+from tmsopt.algebra import ProofFailed
 from tmsopt.chains import family_of, find_discriminant, find_point, measure_point, targets_of
 from tmsopt.models import from_coefficients, from_hamiltonian, from_matrices
 from tmsopt.problem import find_symmetry
+
+chain_equations = import_module("tmsopt.global_search.chain_equations")
 
 EXACT = 1e-14  # some roundings
 
@@ -176,6 +181,26 @@ def test_one_parameter_is_enough_and_proved(H, order, g):
     assert proof.proved, proof.reason
     assert proof.geometric_multiplicity == 1
     assert abs(float(proof.parameters["g"].value) - g) <= EXACT
+
+
+def test_a_fixed_number_that_breaks_the_symmetry_is_no_proof():
+    """With a loss 1e-17 above the gain no real g gives a double eigenfrequency, though it rounds to one that does."""
+    uneven = from_hamiltonian([["1j*g", "k"], ["k", "-1j*g*r"]])
+    found = tmsopt.solve(tmsopt.Problem(uneven, fixed={"k": 1.0, "r": 1.0}, free={"g": (0.1, 3.0)}, locate="EP2"))
+    assert tmsopt.prove(found, exact={"r": "1"}).proved
+    assert not tmsopt.prove(found, exact={"r": "1.00000000000000001"}).proved
+
+
+def test_the_part_of_an_equation_that_symmetry_leaves_must_not_vanish():
+    gyroscopic = from_matrices(M=[[1, 0], [0, 1]], D=[[0, "g"], ["-g", 0]], K=[[-1, 0], [0, -4]])
+    problem = tmsopt.Problem(gyroscopic, free={"g": (2.0, 4.0)}, locate="CEP2").posed
+    found = tmsopt.solve(problem)
+    system = chain_equations.build_chain_equations(problem, problem.pattern, found.parameters)
+    start = {n: flint.arb(x) for n, x in found.parameters.items()} | next(system.start_values())
+    system.check(start)
+    (phase,) = system.phases
+    with pytest.raises(ProofFailed, match="phase"):
+        replace(system, phases=(1j * phase,)).check(start)
 
 
 def test_all_points_of_a_pt_dimer_and_its_curve():

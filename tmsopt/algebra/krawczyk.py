@@ -7,6 +7,7 @@ Let m be near a solution, Y near the inverse of the Jacobian, and X a box around
 lies in the interior of X, then X contains exactly one solution, and K(X) contains it.
 """
 
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -123,13 +124,16 @@ def enclose_solution(
         raise ProofFailed(
             "the Krawczyk test fails: the Jacobian of the equations is singular at the solution, or nearly so"
         )
-    radii = (
-        ((1 - flint.arb(k) / _BOXES_PER_DECADE) / 10**decade).mid()
+    distances = [enclosure[n].rad() + abs(enclosure[n] - middle[n]).upper() for n in names]
+    least_radius = max((distance / u).upper() for distance, u in zip(distances, sizes, strict=True))
+    radii = [
+        radius
         for decade in range(_DECADES)
         for k in range(_BOXES_PER_DECADE)
-    )
-    radius = next((r for r in radii if apply_krawczyk([r * u for u in sizes])), flint.arb(0))
-    distances = [enclosure[n].rad() + abs(enclosure[n] - middle[n]).upper() for n in names]
-    if not radius > max(distance / u for distance, u in zip(distances, sizes, strict=True)):
+        if (radius := ((1 - flint.arb(k) / _BOXES_PER_DECADE) / 10**decade).mid()) > least_radius
+    ]
+    # the test holds in all boxes up to a size, so halving finds the largest one; the proof does not rest on that
+    largest = bisect_left(radii, True, key=lambda r: apply_krawczyk([r * u for u in sizes]) is not None)
+    if largest == len(radii):
         raise ProofFailed("the Krawczyk test fails in every box except the smallest: the solution is hardly isolated")
-    return Enclosure(enclosure, lower_bound(radius))
+    return Enclosure(enclosure, lower_bound(radii[largest]))

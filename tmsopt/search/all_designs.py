@@ -297,9 +297,7 @@ def _prove_completeness(problem: Posed, seconds: float, progress: ReportCount | 
     if reduced is problem:
         return prove_completeness(problem, seconds, progress)
     proof = prove_completeness(reduced, seconds, progress)
-    designs = [d for d in proof.designs if not _has_crossing(problem, d)]
-    limits = [limit for d, limit in zip(proof.designs, proof.limits, strict=True) if d in designs]
-    proof = replace(proof, designs=tuple(designs), limits=tuple(limits))
+    # proved designs are no crossings: with two eigenvectors the adjugate is 0, and the reduced equations are singular
     order = max(c for _, c, _ in composition(str(problem.pattern and problem.pattern.name)))
     if proof.complete and 2 * order <= problem.model.degree:
         reason = (
@@ -307,10 +305,6 @@ def _prove_completeness(problem: Posed, seconds: float, progress: ReportCount | 
         )
         return replace(proof, complete=False, reason=reason)
     return proof
-
-
-def _has_crossing(problem: Posed, design: Mapping[str, Any]) -> bool:
-    return recheck(problem, problem.ordered({n: float(x) for n, x in design.items()})).is_crossing
 
 
 def _check_isolated(problem: Posed) -> None:
