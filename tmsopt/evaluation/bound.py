@@ -23,10 +23,23 @@ import numpy as np
 from flint.utils.flint_exceptions import DomainError
 
 from tmsopt.algebra.balls import Tilt, as_ball, exact
-from tmsopt.algebra.formula import CONSTANT, INPUT, Formula, fold, make_node, trace
-from tmsopt.algebra.intervals import ball
+from tmsopt.algebra.formula import (
+    CONSTANT,
+    INPUT,
+    Formula,
+    UnsupportedOperation,
+    constant,
+    fold,
+    formula,
+    make_node,
+    symbol,
+    trace,
+)
+from tmsopt.algebra.identity import multiply_out
+from tmsopt.algebra.intervals import ball, ranges
 from tmsopt.algebra.kinds import BALLS, quotient_or_nan, values
 from tmsopt.models import Model, ParameterSet
+from tmsopt.models.stated.pairs import list_parts
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Bound
 from tmsopt.program.nlp import objective_size
@@ -57,6 +70,8 @@ def minimizes_abscissa(problem: Posed) -> bool:
 
 def instant_bound(problem: Posed, value: float) -> Bound:
     """The bound by ω0; if ω0 leaves a gap, the bound by relations of the coefficients if it is better."""
+    if problem.model.polynomial is None:
+        return _trace_bound(problem, value) if minimizes_abscissa(problem) else Bound()
     product_bound = omega0_bound(problem, value)
     if product_bound.proven or not minimizes_abscissa(problem):
         return product_bound
@@ -64,6 +79,40 @@ def instant_bound(problem: Posed, value: float) -> Bound:
         relation_bound(_select_first_case(problem)), value, "relation", objective_size(problem)
     )
     return linear_bound if linear_bound.value > product_bound.value else product_bound
+
+
+def _trace_bound(problem: Posed, value: float) -> Bound:
+    """The least mean of the real parts of the roots over the box, for matrices with a constant leading matrix."""
+    first_case = _select_first_case(problem)
+    mean = _mean_formula(problem.model, first_case)
+    if mean is None:
+        return Bound()
+    try:
+        ((low, _),) = ranges(mean, [*first_case.free.values()])
+    except UnsupportedOperation:
+        return Bound()
+    return _compare_with_bound(low, value, "relation", objective_size(problem))
+
+
+@lru_cache(maxsize=64)
+def _mean_formula(model: Model, problem: Posed) -> Formula | None:
+    """Re tr(−P₀⁻¹ P₁)/N in the free parameters; None if P₀ varies or is no matrix of fractions, or is singular."""
+    assert model.pencil is not None
+    parameters = {**problem.as_nodes(problem.fixed), **{n: symbol(n) for n in problem.free}}
+    leading, second, *_ = model.pencil(problem.parameter_set.native(problem.ordered(parameters)))
+    parts = [constant(x).fraction for x in list_parts([leading])]
+    if any(x is None for x in parts) or any(parts[1::2]):
+        return None
+    n, real_parts = len(leading), list_parts([second])[::2]
+    try:
+        inverse = flint.fmpq_mat(
+            n, n, [flint.fmpq(x.numerator, x.denominator) for x in parts[::2] if x is not None]
+        ).inv()
+        entries = ((i, j, inverse[i, j]) for i in range(n) for j in range(n) if inverse[i, j] != 0)
+        total = sum(real_parts[j * n + i] * constant(Fraction(int(x.p), int(x.q))) for i, j, x in entries)
+        return multiply_out(formula([-total / model.degree], tuple(problem.free)))
+    except (ZeroDivisionError, UnsupportedOperation):
+        return None
 
 
 def omega0_bound(problem: Posed, value: float) -> Bound:

@@ -5,9 +5,9 @@ Columns with error bounds (`Bounded`) give values with error bounds.
 """
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, NO_RADIUS, regularise
 from tmsopt.records import AnyNumbers, Complex
 from tmsopt.roots import CLASSES, Conditioning, find_conditioning, find_motion, roots
+from tmsopt.roots.chains import batch_eigenvalues
 
 _MAX_ENTRIES = 2**18  # largest number of entries of the state matrices that are computed together: 4 MB for each array
 
@@ -53,12 +54,7 @@ class ArrayFunction:
             Name → value, in the shape of the columns that the expression depends on.
         """
         missing_names = {n for n in self.formula.inputs if n not in columns}
-        root_values = dict[str, Any]()
-        if missing_names and self.problem.model.polynomial is not None:
-            root_values = roots_of(coefficients_of(self.problem, columns), missing_names)
-        elif missing_names:
-            found = find_eigenvalues(self.problem.model, self.problem.parameter_set, columns)
-            root_values = describe_eigenvalues(found.eigenvalues, self.problem.model.is_complex)
+        root_values = find_root_quantities(self.problem, columns, missing_names)[1] if missing_names else {}
         return dict(zip(self.names, evaluate_on_arrays(self.formula, {**columns, **root_values}), strict=True))
 
 
@@ -88,6 +84,20 @@ def _cached_function(problem: Posed, expressions: tuple[str | Expression, ...]) 
 def coefficients_of(problem: Posed, columns: AnyNumbers) -> list[Any]:
     """Coefficients of designs; each has the shape of the columns that it depends on."""
     return evaluate_on_arrays(coefficient_formula(problem.model, problem.parameter_set.name), columns)
+
+
+def find_root_quantities(
+    problem: Posed, columns: AnyNumbers, names: Collection[str] = ROOTS
+) -> tuple[Any, dict[str, Any]]:
+    """Whether designs have all their roots, and root quantities from numeric roots, as `roots_of` gives them.
+
+    As in the recheck, all coefficients must be finite and the mass matrix nonsingular.
+    """
+    if problem.model.polynomial is None:
+        s = compute_eigenvalues(problem.model, problem.parameter_set, columns)
+        return np.isfinite(s).all(axis=-1), describe_eigenvalues(s, problem.model.is_complex)
+    a = coefficients_of(problem, columns)
+    return reduce(np.logical_and, map(np.isfinite, a), a[0] != 0), roots_of(a, names)
 
 
 def evaluate_matrices(model: Model, parameter_set: ParameterSet, columns: AnyNumbers) -> NDArray[Any]:
@@ -126,18 +136,32 @@ def find_eigenvalues(model: Model, parameter_set: ParameterSet, columns: AnyNumb
     Args:
         columns: as for `evaluate_matrices`.
     """
+    shape, batches = _batches(model, parameter_set, columns)
+    arrays = map(np.concatenate, zip(*(vars(find_conditioning(batch)).values() for batch in batches), strict=True))
+    return Conditioning(*(x.reshape(*shape, x.shape[-1]) for x in arrays))
+
+
+def compute_eigenvalues(model: Model, parameter_set: ParameterSet, columns: AnyNumbers) -> Complex:
+    """All eigenvalues of many designs, shape (…, number of eigenvalues); nan where undefined.
+
+    Args:
+        columns: as for `evaluate_matrices`.
+    """
+    shape, batches = _batches(model, parameter_set, columns)
+    s = np.concatenate([*map(batch_eigenvalues, batches)])
+    return s.reshape(*shape, s.shape[-1])
+
+
+def _batches(
+    model: Model, parameter_set: ParameterSet, columns: AnyNumbers
+) -> tuple[tuple[int, ...], Iterator[NDArray[Any]]]:
+    """The shape of the columns, and the matrices of so many designs at a time that they fit the memory."""
     shape = np.broadcast_shapes(*map(np.shape, columns.values()))
     flat_columns = {n: np.broadcast_to(x, shape).reshape(-1) for n, x in columns.items()}
     _, (terms, n, _) = _matrix_formula(model, parameter_set.name)
     step = max(1, _MAX_ENTRIES // ((terms - 1) * n) ** 2)
-    blocks = [
-        find_conditioning(
-            evaluate_matrices(model, parameter_set, {m: x[k : k + step] for m, x in flat_columns.items()})
-        )
-        for k in range(0, math.prod(shape), step)
-    ]
-    arrays = zip(*(vars(block).values() for block in blocks), strict=True)
-    return Conditioning(*(np.concatenate(parts).reshape(*shape, -1) for parts in arrays))
+    parts = ({m: x[k : k + step] for m, x in flat_columns.items()} for k in range(0, max(math.prod(shape), 1), step))
+    return shape, (evaluate_matrices(model, parameter_set, part) for part in parts)
 
 
 def describe_eigenvalues(s: Complex, is_complex: bool) -> dict[str, Any]:

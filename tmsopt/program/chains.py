@@ -13,6 +13,8 @@ from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import Builder, default_start
 from tmsopt.program.kinks import epigraph_form
 from tmsopt.program.nlp import NLP
+from tmsopt.program.starts import initial_point
+from tmsopt.program.subspaces import find_spectra, start_subspaces
 from tmsopt.records import Array
 from tmsopt.roots.chains import Chain, expand, size_at
 
@@ -23,7 +25,7 @@ def formulate_chains(problem: Posed, targets: Sequence[Target], point: Exception
     The equations Σ L_i x_(j−i) = 0 with the Taylor coefficients L_i of the matrix polynomial, and c* x_j constant, are
     polynomials in the eigenvalues and the vectors x_j.
     """
-    build, x = Builder(problem, ()), [*point.p]
+    build, x = Builder(problem, problem.cases), list[float]()
     *_, parameters = build.values[0].given
     assert problem.model.pencil is not None
     assert problem.pattern is not None
@@ -36,7 +38,10 @@ def formulate_chains(problem: Posed, targets: Sequence[Target], point: Exception
     else:
         build.minimise_distance(default_start(problem))
     nlp = epigraph_form(build.finish("chains"), needs_two_sided_bounds(problem))
-    return nlp, nlp.set_kinks(np.array([*x, *[0.0] * (len(nlp.variables) - len(x))]))
+    design = dict(zip(problem.free, point.p.tolist(), strict=True))
+    if problem.model.polynomial is None:
+        nlp = start_subspaces(nlp, problem, find_spectra(problem, design, nlp.cases))
+    return nlp, initial_point(nlp, problem, design, is_near=True, known=x)
 
 
 def _add_chain(build: Builder, name: str, target: Target, chain: Chain, pencil: Sequence[Any]) -> list[float]:

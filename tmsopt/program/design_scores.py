@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from tmsopt.models.expression import Expression
 from tmsopt.problem.dependence import WORSE_DIRECTION
-from tmsopt.problem.evaluate import coefficients_of, evaluate, roots_of
+from tmsopt.problem.evaluate import evaluate, find_root_quantities
 from tmsopt.problem.problem import Posed
 from tmsopt.records import Array
 
@@ -57,11 +56,12 @@ def score_designs(problem: Posed, columns: Mapping[str, Array]) -> DesignScores:
     shape_of_cases = (len(cases) or 1, *shape)
     conditions = list(problem.conditions.values())
     expressions = [e for e in (problem.objective, *conditions) if e]
-    a, names = coefficients_of(problem, parameters), {n for e in expressions for n in e.names}
-    # As in the recheck, all coefficients must be finite and the mass matrix nonsingular.
-    has_dynamics = np.broadcast_to(reduce(np.logical_and, map(np.isfinite, a), a[0] != 0), shape_of_cases)
-    worst_values = {}
-    for name, x in roots_of(a, {*names, "abscissa"} if _RATIO in names else names).items():
+    names = {n for e in expressions for n in e.names}
+    has_roots, quantities = find_root_quantities(
+        problem, parameters, {*names, "abscissa"} if _RATIO in names else names
+    )
+    has_dynamics, worst_values = np.broadcast_to(has_roots, shape_of_cases), {}
+    for name, x in ((n, quantities[n]) for n in WORSE_DIRECTION if n in quantities):
         sign = WORSE_DIRECTION[name]
         worst_values[name] = sign * np.broadcast_to(sign * x, shape_of_cases).max(axis=0)
     values = dict(zip(expressions, evaluate(problem, expressions, parameters | worst_values), strict=True))

@@ -29,6 +29,7 @@ from tmsopt.program.boundary_points import lift_boundary_points, lift_displaceme
 from tmsopt.program.kinks import epigraph_form
 from tmsopt.program.lifts import (
     LiftedQuantity,
+    covered_indices,
     guess_worst_value,
     lift_abscissa,
     lift_angular_frequency,
@@ -49,6 +50,7 @@ from tmsopt.program.nlp import (
     units_of,
     variable_name,
 )
+from tmsopt.program.subspaces import lift_by_subspaces
 from tmsopt.records import Table
 from tmsopt.roots import Pattern
 
@@ -67,8 +69,9 @@ def formulate(
     elastic: bool = False,
     damping_ratio: float | None = None,
     a0_sign: int = 0,
+    counts: Sequence[int] = (),
 ) -> NLP:
-    """Formulate a problem by its pattern, or without a pattern by factors. Each max, min and abs becomes a variable.
+    """Formulate a problem by its pattern, or without a pattern by factors or subspaces. Each max, min and abs becomes a variable.
 
     Args:
         cases: the variations that the design must withstand; by default only the nominal design.
@@ -76,11 +79,13 @@ def formulate(
         damping_ratio: fix the damping ratio at 1 (all roots real and negative) or −1 (a positive real root). The
             recheck of the solution tests whether it has this damping ratio.
         a0_sign: +1 allows a0 >= 0, −1 allows a0 <= 0, 0 excludes a0 = 0.
+        counts: without a polynomial, the sizes of the subspaces, one for each case that root quantities cover; by
+            default all eigenvalues, or two if they are many.
     """
     if problem.pattern:
         nlp = formulate_matching(problem, cases=cases)
     else:
-        nlp = formulate_by_factors(problem, cases, elastic, damping_ratio, a0_sign)
+        nlp = formulate_by_factors(problem, cases, elastic, damping_ratio, a0_sign, counts)
     return epigraph_form(nlp, needs_two_sided_bounds(problem))
 
 
@@ -90,9 +95,10 @@ def formulate_by_factors(
     elastic: bool = False,
     damping_ratio: float | None = None,
     a0_sign: int = 0,
+    counts: Sequence[int] = (),
 ) -> NLP:
-    """Optimise the objective, with every root quantity expressed by factors in every case."""
-    build = Builder(problem, cases, a0_sign=a0_sign)
+    """Optimise the objective, with every root quantity expressed by factors or subspaces in every case."""
+    build = Builder(problem, cases, a0_sign=a0_sign, counts=counts)
     if damping_ratio == 1 or (damping_ratio is None and not elastic and demands_heavy_damping(problem)):
         build.require_real_roots()
     elif damping_ratio is not None:
@@ -147,8 +153,9 @@ class Builder:
     """Collects the variables and rows of one NLP.
 
     Args:
-        lift_functions: root quantity → the function that adds it to the NLP; by default as factors.
+        lift_functions: root quantity → the function that adds it to the NLP; by default as factors or subspaces.
         a0_sign: +1 allows a0 >= 0, −1 allows a0 <= 0, 0 excludes a0 = 0.
+        counts: see `formulate`.
     """
 
     def __init__(
@@ -157,10 +164,13 @@ class Builder:
         cases: Sequence[Case],
         lift_functions: Mapping[str, LiftFunction] | None = None,
         a0_sign: int = 0,
+        counts: Sequence[int] = (),
     ) -> None:
         self.problem, self.a0_sign = problem, a0_sign
         self.numbers = numbers_of(problem)
-        self.lift_functions = _LIFT_FUNCTIONS if lift_functions is None else lift_functions
+        has_polynomial = problem.model.polynomial is not None
+        default = _LIFT_FUNCTIONS if has_polynomial else {"abscissa": partial(lift_by_subspaces, counts)}
+        self.lift_functions = default if lift_functions is None else lift_functions
         self.cases = tuple(cases)
         self.names: list[str] = []
         self.x: list[Any] = []
@@ -187,7 +197,7 @@ class Builder:
         self.values = [self.derive_values(k, case_parameters) for k, case_parameters in enumerate(parameters)]
         self.scale = scale_of(problem)
         self.a = self.polynomial(0)
-        self.covered_cases = [k for k, case in enumerate(self.cases, start=1) if not case.direction] or [0]
+        self.covered_cases = covered_indices(self.cases)
         if radius_cases:
             self.lifts.append(lift_displacements(problem.weights, displacements))
             self.lifts.append(lift_radius(self, [k for k in radius_cases if k not in displacements]))

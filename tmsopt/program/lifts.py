@@ -9,6 +9,7 @@ import numpy as np
 
 from tmsopt.models import Values
 from tmsopt.models.expression import Expression
+from tmsopt.problem.cases import Case
 from tmsopt.program.nlp import AddedVariable, Contact, Factor, Scale
 from tmsopt.records import Array
 from tmsopt.roots import product, shift
@@ -45,6 +46,11 @@ class ProgramBuilder(Protocol):
     @property
     def size(self) -> tuple[int, int]:
         """Number of variables and rows so far."""
+
+
+def covered_indices(cases: Sequence[Case]) -> list[int]:
+    """Indices of the cases over which a root quantity takes its worst value; 0 is the nominal one."""
+    return [k for k, case in enumerate(cases, start=1) if not case.direction] or [0]
 
 
 @dataclass(frozen=True)
@@ -119,7 +125,7 @@ def _lift_by_factors(
             if not sign:
                 factors.append(Factor(index, is_linear=True))
             if is_shifted and (not sign or not quadratic_count):
-                contacts.append(Contact(partial(_step_distance, index), variable=index))
+                contacts.append(Contact(partial(step_distance, index), variable=index))
         matched = [(sign or a[0]) * c for c in product(*factor_coefficients)]
         build.add_equations(name, shift(a, edge) if is_shifted else a, matched)
         products.append(tuple(factors))
@@ -145,7 +151,7 @@ def lift_abscissa(build: ProgramBuilder) -> LiftedQuantity:
     def quadratic(gamma: Any, k: int, case: int, leading: Any) -> tuple[list[Any], list[Contact]]:
         index = build.size[0]
         beta, kappa = build.add_variable(f"beta{k}.{case}", 0.0), build.add_variable(f"kappa{k}.{case}", 0.0)
-        distances = (_pair_distance, _real_distance)
+        distances = (pair_distance, real_distance)
         contacts = [Contact(partial(distance, index), variable=index + j) for j, distance in enumerate(distances)]
         return [1 if leading is None else leading, beta, kappa], contacts
 
@@ -238,7 +244,7 @@ def lift_real_roots(build: ProgramBuilder, has_abscissa: bool) -> LiftedQuantity
         a = build.polynomial(case)
         index = build.size[0]
         steps = [build.add_variable(f"d{k}.{case}", 0.0) for k in range(1, len(a))]
-        contacts.append(Contact(partial(_step_distance, index), variable=index))
+        contacts.append(Contact(partial(step_distance, index), variable=index))
         distances = [sum(steps[:k], 0) for k in range(1, len(a))]
         build.add_equations("abscissa", shift(a, gamma), [a[0] * c for c in product(*([1, d] for d in distances))])
     lift = AddedVariable("abscissa", build.size[0] - first_index, partial(_guess_real_roots, cases, has_abscissa))
@@ -282,19 +288,19 @@ def guess_worst_value(
 _MAX_DOUBLE_GAP = 1e-3  # two real roots with a smaller distance, relative to the largest root, may be one double root
 
 
-def _pair_distance(index: int, x: Array) -> float:
+def pair_distance(index: int, x: Array) -> float:
     """Distance from the line to a complex pair of t² + βt + κ, or to the middle of a real pair."""
     return float(x[index] / 2)
 
 
-def _real_distance(index: int, x: Array) -> float:
+def real_distance(index: int, x: Array) -> float:
     """Distance from the line to the nearer real root; for a complex pair, its distance plus |Im s|."""
     half, kappa = x[index] / 2, x[index + 1]
     offset = float(np.sqrt(abs(half * half - kappa)))
     return float(half + offset if half * half < kappa else kappa / (half + offset or 1.0))
 
 
-def _step_distance(index: int, x: Array) -> float:
+def step_distance(index: int, x: Array) -> float:
     """Distance from the line to the rightmost root."""
     return float(x[index])
 

@@ -76,18 +76,21 @@ def _move_to_faces(problem: Posed, design: Mapping[str, float]) -> dict[str, flo
     return values
 
 
-def initial_point(nlp: NLP, problem: Posed, design: Mapping[str, float], is_near: bool = False) -> Array:
+def initial_point(
+    nlp: NLP, problem: Posed, design: Mapping[str, float], is_near: bool = False, known: Sequence[float] = ()
+) -> Array:
     """The starting point of an NLP: the design, and values of the added variables that satisfy their equations.
 
     Args:
         is_near: whether the design is near a solution.
+        known: values of the variables between the design and the lifts.
     """
     nominal = problem.ordered(design)
     radius = _find_stable_radius(nlp, problem, nominal)
     case_parameters = (case.applied(nominal, radius, problem.weights) for case in nlp.cases)
     values = [problem.values(nominal).with_known({RADIUS: radius}), *map(problem.values, case_parameters)]
     z = _compute_roots(nlp, values)
-    x = variables_of(problem, design)
+    x = [*variables_of(problem, design), *known]
     for lift in nlp.lifts:
         guess = lift.guess_near if is_near and lift.guess_near else lift.guess
         guesses = guess(values, z) or [[0.0] * lift.size]
@@ -105,7 +108,9 @@ def complete_starts(nlp: NLP, problem: Posed, design: Mapping[str, float]) -> It
 
 
 def _compute_roots(nlp: NLP, values: Sequence[Values]) -> list[Roots]:
-    """Roots in each case, in the unit of the NLP."""
+    """Roots in each case, in the unit of the NLP; none without a polynomial."""
+    if values[0].model.polynomial is None:
+        return [np.empty(0)] * len(values)
     return list(roots(regularise(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
 
 

@@ -191,6 +191,24 @@ def linearise(matrices: Any) -> Any:
     return M
 
 
+def linearise_batch(matrices: Any) -> tuple[Any, Any]:
+    """State matrices of shape (…, d n, d n), and whether each is defined: P₀ is regular, and all entries are finite.
+
+    An undefined one is 0.
+    """
+    with np.errstate(all="ignore"):
+        is_singular = np.linalg.slogdet(matrices[..., 0, :, :])[0] == 0
+        state = linearise(np.where(is_singular[..., None, None, None], np.nan, matrices))
+    is_defined = np.isfinite(state).all(axis=(-2, -1))
+    return np.where(is_defined[..., None, None], state, 0.0), is_defined
+
+
+def batch_eigenvalues(matrices: Any) -> Complex:
+    """The eigenvalues of matrix polynomials, shape (…, d n); nan where undefined."""
+    state, is_defined = linearise_batch(matrices)
+    return np.where(is_defined[..., None], np.linalg.eigvals(state), np.nan + 0j)
+
+
 def eigenvalues_of(matrices: Complex) -> Complex:
     """The eigenvalues of a matrix polynomial with a regular leading matrix; for a real one real or conjugate."""
     M = linearise(matrices)

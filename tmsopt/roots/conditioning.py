@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.records import Array, Complex
-from tmsopt.roots.chains import linearise, make_cluster, schur_form
+from tmsopt.roots.chains import linearise, linearise_batch, make_cluster, schur_form
 
 _ROUNDING = 2.0**-52  # a smaller relative singular value of the eigenvectors counts as this value
 _MIN_RIGIDITY = 1e-12
@@ -74,12 +74,11 @@ def find_conditioning(matrices: Any) -> Conditioning:
     """
     P = np.asarray(matrices, dtype=np.result_type(np.asarray(matrices), float))
     n = P.shape[-1]
+    state, is_defined = linearise_batch(P)
+    is_defined = is_defined[..., None]
     with np.errstate(all="ignore"):
-        is_singular = np.linalg.slogdet(P[..., 0, :, :])[0] == 0
-        state = linearise(np.where(is_singular[..., None, None, None], np.nan, P))
-        is_defined = np.isfinite(state).all(axis=(-2, -1))[..., None]
         P = np.where(is_defined[..., None, None], P, np.eye(n))
-        s, right = np.linalg.eig(np.where(is_defined[..., None], state, 0.0))
+        s, right = np.linalg.eig(state)
         U, values, V = np.linalg.svd(right.astype(complex))
         left = _adjoint(V) / np.maximum(values, _ROUNDING)[..., None, :] @ _adjoint(U)
         y = left[..., -n:] @ np.linalg.inv(P[..., 0, :, :])

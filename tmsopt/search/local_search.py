@@ -13,10 +13,13 @@ from tmsopt.records import Array
 from tmsopt.roots import roots
 from tmsopt.search.state import LocalEnd, SearchState, Start
 from tmsopt.search.stopping import is_proven
+from tmsopt.search.subspace_search import solve_by_subspaces
 
 
 def solve_from(state: SearchState, start: Start) -> LocalEnd:
-    """Solve from one start. While IPOPT does not converge and restarts help, restart at its end with new factors."""
+    """Solve from one start; without a polynomial, by subspaces. While IPOPT does not converge and restarts help, restart at its end with new factors."""
+    if state.part.model.polynomial is None and state.part.pattern is None:
+        return _add_led_designs(state, solve_by_subspaces(state, start))
     tuning, is_exact = state.tuning, state.nlp.cases and state.nlp.has_exact_starts
     best = run_once(state, start, "near" if start.near else "exact" if is_exact else "far")
     for restart in range(tuning.restarts):

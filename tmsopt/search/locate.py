@@ -20,8 +20,6 @@ from tmsopt.chains import (
 )
 from tmsopt.evaluation.recheck import recheck
 from tmsopt.problem import Posed, Starts, degrees_of_freedom
-from tmsopt.problem.quantities import ROOT_NAMES
-from tmsopt.problem.real_form import has_real_form
 from tmsopt.problem.solution import OtherBranch
 from tmsopt.problem.symmetry import find_symmetry
 from tmsopt.program import Options
@@ -60,13 +58,12 @@ class _Found:
 
 
 def has_chains(problem: Posed) -> bool:
-    """Whether a problem asks for a pattern of the user's matrices, and for no quantity of their roots."""
+    """Whether a problem asks for a pattern of the user's matrices, and for nothing else if they have a polynomial."""
     model = problem.model
     if not (model.statement is not None and model.pencil is not None and problem.locate and problem.free):
         return False
     is_sole_task = problem.objective is None and not has_equalities(problem)
-    asks_roots = any(problem.asks(name) for name in ROOT_NAMES)
-    return not problem.cases and (is_sole_task or (model.polynomial is None and not asks_roots))
+    return model.polynomial is None or (is_sole_task and not problem.cases)
 
 
 def has_equalities(problem: Posed) -> bool:
@@ -164,7 +161,7 @@ def _optimise(
     )
     agreeing = [o for o in outcomes if o.status == "optimal" and _is_same_objective(problem, o, best)]
     best = replace(best, starts=replace(best.starts, at_best=len(agreeing)))
-    return best if best.status == "optimal" or not has_real_form(problem.model) else None
+    return best if best.status == "optimal" or problem.model.polynomial is None else None
 
 
 def _rank_objective(problem: Posed, outcome: Outcome) -> float:
@@ -179,7 +176,7 @@ def _is_same_objective(problem: Posed, outcome: Outcome, best: Outcome) -> bool:
 
 def _fail(problem: Posed, p: Array, start_count: int) -> Outcome | None:
     """The outcome if no start leads to a solution; None if the search by factors can follow."""
-    if has_real_form(problem.model) and not find_symmetry(problem).is_hermitian:
+    if problem.model.polynomial is not None and not find_symmetry(problem).is_hermitian:
         return None
     assert problem.pattern is not None
     design = problem.ordered(dict(zip(problem.free, p.tolist(), strict=True)))

@@ -288,16 +288,23 @@ def sample_box(problem: Posed, seed: int, tuning: Tuning = TUNING) -> Sample:
     boldest = draws.take(np.argsort(draws.objective, kind="stable")[: tuning.ranked_designs])
     objectives = draws.objective[np.isfinite(draws.objective)]
     spread = float(np.subtract(*np.percentile(objectives, [75, 25]))) if objectives.size else 0.0
-    leading = coefficients_of(problem, problem.ordered(box.space.designs(ranked.u)))[0]
-    a0 = np.nan_to_num(np.broadcast_to(leading, len(ranked)))
-    is_singular = bool(a0.min() <= 0 <= a0.max() or np.abs(a0).min() < tuning.vanishing_share * np.median(np.abs(a0)))
     return Sample(
         box,
         refined.take(refined.order),
         boldest.select_apart(tuning.infeasible_leaders, tuning.basin_distance),
         spread,
-        is_singular,
+        _is_nearly_singular(box, ranked),
     )
+
+
+def _is_nearly_singular(box: Box, batch: DesignBatch) -> bool:
+    """Whether a0 comes near 0 in some designs."""
+    if box.problem.model.polynomial is None:
+        return False
+    leading = coefficients_of(box.problem, box.problem.ordered(box.space.designs(batch.u)))[0]
+    a0 = np.nan_to_num(np.broadcast_to(leading, len(batch)))
+    smallest, median = np.abs(a0).min(), np.median(np.abs(a0))
+    return bool(a0.min() <= 0 <= a0.max() or smallest < box.tuning.vanishing_share * median)
 
 
 def _draw_points(space: UnitBox, seed: int, tuning: Tuning) -> Array:

@@ -29,7 +29,7 @@ from tmsopt.problem import (
 )
 from tmsopt.problem.dependence import sense_notes
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
-from tmsopt.problem.real_form import real_form
+from tmsopt.problem.real_form import RealForm, has_real_form, real_form
 from tmsopt.problem.symmetry import find_symmetry
 from tmsopt.problem.verdict.stability import stability
 from tmsopt.program import DEFAULTS, Options, SolveOptions, make_options, objective_size
@@ -131,7 +131,7 @@ def solve_any_status(
     ):
         notes = (*sense_notes(problem), *_describe_hermitian(problem))
         return _assemble(problem, outcome, notes, {}, began, with_bound)
-    form = real_form(problem)
+    form = real_form(problem) if problem.asks_radius or problem.pattern else RealForm(problem)
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
     solution = _search_box(form.problem, options, extra_starts, skipped_parts, with_bound, policy)
     if not (without_sample or solution.interrupted):
@@ -279,12 +279,14 @@ def _find_best_so_far(problem: Posed, searched_parts: Sequence[SearchedPart], ou
 def _search_stable_design(solution: Solution, options: Options, began: float, policy: Policy) -> Solution:
     """If no stable design was found, search for one by branch and bound, and solve again from it."""
     problem = solution.problem.posed
+    if not has_real_form(problem.model):
+        return solution
     if solution.stable is not False or solution.any_stable is False or not solution.stability_sought:
         return solution
     from tmsopt.global_search.stability import find_stable_design  # slow to import, rarely needed
 
     begin(options.progress, "looking for a stable design", "s")
-    answer = find_stable_design(problem, options.stability, solution.parameters, options.progress)
+    answer = find_stable_design(real_form(problem).problem, options.stability, solution.parameters, options.progress)
     if answer.design is not None:
         words = "this design was reached from a stable design that branch and bound found"
         solution = _solve_near(solution, answer.design, words, options, policy)

@@ -51,6 +51,8 @@ def is_proven(state: SearchState, end: LocalEnd) -> bool:
     problem = state.part
     if not (end.feasible and minimizes_abscissa(problem)):
         return False
+    if problem.model.polynomial is None:
+        return instant_bound(problem, end.objective).proven
     a = state.coefficients_at(end)[0]
     bound = -(abs(a[-1] / a[0]) ** (1 / problem.model.degree)) if a[0] else -math.inf
     is_near = is_gap_closed(end.objective - bound, bound, end.nlp.size)

@@ -115,6 +115,11 @@ def is_real(x: Pair) -> bool:
     return constant(x.im).fraction == 0
 
 
+def is_zero(x: Pair) -> bool:
+    """True if a pair is 0 for all parameters."""
+    return is_real(x) and constant(x.re).fraction == 0
+
+
 def _whole_exponent(n: Pair) -> int | None:
     if not is_real(n):
         return None
