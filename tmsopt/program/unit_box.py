@@ -11,7 +11,6 @@ from tmsopt.problem.problem import Posed
 from tmsopt.records import Array
 
 _STEEPNESS = 7.0  # c of the scale near 0: its inner half covers 3 % of a range, its inner tenth 0.2 % of the range
-_BISECTIONS = 60  # a point is then known to a rounding
 _MAX_LINEAR_RATIO = 100.0  # if the ratio of the ends of a range is larger, its scale is logarithmic
 
 
@@ -56,14 +55,13 @@ class UnitBox:
         slopes[..., rows] = (1 + self._ends[3][rows] / np.hypot(x, size) / (ends[1] - ends[0])) / 2
         return np.clip(points, 0.0, 1.0), slopes
 
-    def restore(self, points: Array) -> Array:
-        """The inverse of `resolve_near_zero`, by bisection."""
-        low, high = np.zeros_like(points), np.ones_like(points)
-        for _ in range(_BISECTIONS):
-            middle = (low + high) / 2
-            is_below = self.resolve_near_zero(middle)[0] < points
-            low, high = np.where(is_below, middle, low), np.where(is_below, high, middle)
-        return np.where(points <= 0, 0.0, np.where(points >= 1, 1.0, (low + high) / 2))
+    def spread_near_zero(self, u: Array) -> Array:
+        """The inverse of `sample_near_zero`."""
+        rows, size, ends = self._zero_scales
+        points = u.copy()
+        x = (self._ends[2] + self._ends[3] * u)[..., rows]
+        points[..., rows] = np.clip((np.arcsinh(x / size) - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)
+        return points
 
     def sample_near_zero(self, u: Array) -> Array:
         """Spread points along x = b sinh(c y)/sinh(c) in each range that contains 0."""

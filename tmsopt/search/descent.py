@@ -30,6 +30,7 @@ _MAX_TRIALS = 40  # steps of a line search
 _FLAT = 1e-10  # relative decrease over the last steps below which the descent ends
 _PATIENCE = 12  # these last steps
 _PENALTY = 10.0  # weight of the excess over a limit, in units of the spread of the objective
+_INSIDE = 0.99999  # a start on a face of the box is moved inside, where the slope by y is not 0
 _DIFFERENCE = 1e-6  # step of y for the slopes of p
 
 
@@ -49,8 +50,8 @@ class Descent:
 
     def run(self, design: Mapping[str, float]) -> dict[str, float]:
         """The design where the descent from another one ends."""
-        u, _ = self.space.resolve_near_zero(self.space.point(design))
-        y = np.arcsin(np.clip(2 * u - 1, -0.999, 0.999))
+        w = self.space.spread_near_zero(self.space.point(design))
+        y = np.arcsin(np.clip(2 * w - 1, -_INSIDE, _INSIDE))
         value, slope = self.value(y)
         if not np.isfinite(value):
             return dict(design)

@@ -16,7 +16,7 @@ from tmsopt.problem import Case, Posed
 from tmsopt.problem.quantities import matrices_at
 from tmsopt.program import NLP, formulate, initial_point
 from tmsopt.program.formulate import design_of, variables_of
-from tmsopt.program.ipopt import make_ipopt
+from tmsopt.program.ipopt import Run, make_ipopt
 from tmsopt.program.lifts import covered_indices
 from tmsopt.program.subspaces import Spectrum, covered_cases, find_others, find_spectra, start_subspaces
 from tmsopt.program.unit_box import UnitBox
@@ -26,7 +26,7 @@ from tmsopt.search.descent import Descent
 from tmsopt.search.state import LocalEnd, SearchState, Start, clip_to_box, make_failed_end
 
 _MAX_STEPS = 40
-_FIRST_RADIUS = 0.1  # of the box, in a scale that resolves small values
+_FIRST_RADIUS = 0.05  # of the box, in a scale that resolves small values
 _MIN_RADIUS = 1e-7
 _SHRINK, _GROW = 0.25, 3.0
 _NEAR_LINE = 0.05  # of the size of the eigenvalues: those nearer to the rightmost one are in the first subspace
@@ -49,11 +49,11 @@ def solve_by_subspaces(state: SearchState, start: Start) -> LocalEnd:
             counts = tuple(len(one.eigenvalues) for one in spectra)
             nlp = state.nlp if is_elastic else make_program(part, state.nlp.cases, counts)
             nlp = start_subspaces(nlp, part, spectra)
-            trial = _run_ipopt(state, start, nlp, design, _trust_region(space, design, radius))
+            start_end, trial = _run_ipopt(state, start, nlp, design, _trust_region(space, design, radius))
             has_crossed = trial.feasible and _has_crossed(part, spectra, trial)
         except np.linalg.LinAlgError:
             break
-        if not trial.feasible or has_crossed:
+        if not trial.feasible or has_crossed or trial.rank > start_end.rank:
             radius *= _SHRINK
             extra += 2 * has_crossed
             if radius < _MIN_RADIUS:
@@ -94,37 +94,36 @@ def _count_near(problem: Posed, nlp: NLP, design: Mapping[str, float]) -> list[i
 
 
 def _position(space: UnitBox, design: Mapping[str, float]) -> Array:
-    return space.resolve_near_zero(space.point(design))[0]
+    return space.spread_near_zero(space.point(design))
 
 
 def _trust_region(space: UnitBox, design: Mapping[str, float], radius: float) -> list[dict[str, float]]:
     """The corners of the trust region with the least and with the greatest values."""
     centre = _position(space, design)
     ends = (np.clip(centre + change, 0.0, 1.0) for change in (-radius, radius))
-    return [{n: float(x) for n, x in space.designs(space.restore(end)).items()} for end in ends]
+    return [{n: float(x) for n, x in space.designs(space.sample_near_zero(end)).items()} for end in ends]
 
 
 def _run_ipopt(
     state: SearchState, start: Start, nlp: NLP, design: Mapping[str, float], region: Sequence[Mapping[str, float]]
-) -> LocalEnd:
-    """Run IPOPT within a trust region on a few variants of the program; return the best end, without the region."""
+) -> tuple[LocalEnd, LocalEnd]:
+    """The start, and the best end of IPOPT on a few variants of the program within a trust region."""
     x, count = initial_point(nlp, state.part, design), len(state.part.free)
     low, high = (variables_of(state.part, corner) for corner in region)
     limited = replace(nlp, lower=(*low, *nlp.lower[count:]), upper=(*high, *nlp.upper[count:]))
-    ends = list[LocalEnd]()
-    for variant in islice(limited.impose_contacts(x), state.tuning.max_variants):
-        run = make_ipopt(nlp, state.options, "near")(x, variant)
+
+    def end_at(run: Run, variant: NLP) -> LocalEnd:
         f, rows = variant.evaluate(run.x)
-        whole = replace(
-            variant,
-            lower=(*nlp.lower[:count], *variant.lower[count:]),
-            upper=(*nlp.upper[:count], *variant.upper[count:]),
-        )
+        lower, upper = (*nlp.lower[:count], *variant.lower[count:]), (*nlp.upper[:count], *variant.upper[count:])
         excesses = np.maximum(np.array(variant.row_lower) - rows, rows - np.array(variant.row_upper)).clip(0)
         is_finite = bool(np.all(np.isfinite([f, *rows, *run.x])))
-        is_feasible = is_finite and excesses.max(initial=0.0) <= state.tuning.feasible_violation
-        ends.append(LocalEnd(start, whole, run, f if is_finite else math.inf, bool(is_feasible)))
-    return min(ends, key=lambda end: end.rank)
+        is_feasible = is_finite and bool(excesses.max(initial=0.0) <= state.tuning.feasible_violation)
+        return LocalEnd(start, replace(variant, lower=lower, upper=upper), run, f if is_finite else math.inf, is_feasible)
+
+    variants = [*islice(limited.impose_contacts(x), state.tuning.max_variants)]
+    runs = [make_ipopt(nlp, state.options, "near")(x, variant) for variant in variants]
+    ends = [end_at(run, variant) for run, variant in zip(runs, variants, strict=True)]
+    return end_at(replace(runs[0], x=x), nlp), min(ends, key=lambda end: end.rank)
 
 
 def _has_crossed(problem: Posed, spectra: Sequence[Spectrum], end: LocalEnd) -> bool:
