@@ -26,9 +26,9 @@ from tmsopt.roots.chains import eigenvectors_of, linearised_slopes
 
 _MAX_STEPS = 200
 _ARMIJO, _WOLFE = 1e-4, 0.9  # of the weak Wolfe conditions
-_MAX_TRIALS = 40  # steps of a line search
-_FLAT = 1e-10  # relative decrease over the last steps below which the descent ends
-_PATIENCE = 12  # these last steps
+_MAX_TRIALS = 20  # steps of a line search
+_FLAT = 1e-4  # relative decrease over the last steps below which the descent ends
+_PATIENCE = 10  # these last steps
 _PENALTY = 10.0  # weight of the excess over a limit, in units of the spread of the objective
 _INSIDE = 0.99999  # a start on a face of the box is moved inside, where the slope by y is not 0
 _DIFFERENCE = 1e-6  # step of y for the slopes of p
