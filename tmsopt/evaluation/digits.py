@@ -181,7 +181,7 @@ class _Design:
         If roots remain undecided, the result is None, or at the last precision the roots of the recheck.
         """
         if self.problem.model.polynomial is None:  # the eigenvalues are computed in doubles
-            worst = roots_at(self.problem.model, self.problem.parameter_set, self.checked.worst.applied(self.exact))
+            worst = roots_at(self.problem.model, self.problem.parameter_set, self.values(self.checked.worst))
             return _as_enclosed(worst), {case: _as_enclosed(s.roots) for case, s in self.structures.items()}
         stored = enclosed_roots(self.values(self.checked.worst).coefficients)
         ideal: dict[Case, _Roots] = {}

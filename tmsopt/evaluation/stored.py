@@ -27,7 +27,7 @@ from tmsopt.evaluation.recheck import FEASIBILITY_TOLERANCE, Evaluation, find_mi
 from tmsopt.models import Values
 from tmsopt.problem.cases import Case
 from tmsopt.problem.problem import Posed
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY, ROOT_NAMES
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, ROOT_NAMES, approximate_eigenvalues
 from tmsopt.problem.solution import Solution
 from tmsopt.problem.unit_system import amounts_text, unit_at
 from tmsopt.records import Array, Numbers
@@ -271,14 +271,25 @@ class _SpreadRoots:
         """Each part of each cₖ of an exact design, minus its target."""
         parts, (targets, _, _) = [], self.requirements.tolist()
         for cluster in self.clusters:
-            a = self.problem.model.coefficients(cluster.case.applied(design), self.problem.parameter_set)
-            if not all(c.is_finite() for c in a):
+            roots = _find_roots(self.problem, cluster.case.applied(design))
+            if not roots:
                 return [flint.arb("nan")] * len(targets)
             centre, direction = flint.acb(cluster.centre), flint.acb(cluster.direction)
-            z = sorted((z for z, m in isolated_roots(a) for _ in range(m)), key=lambda z: float(abs(z - centre)))
+            z = sorted(roots, key=lambda z: float(abs(z - centre)))
             c = product(*([flint.acb(1), (centre - root) / direction] for root in z[: cluster.root.multiplicity]))
             parts += [c[k].real if is_real else c[k].imag for k, is_real in cluster.components()]
         return [(x - t).mid() for x, t in zip(parts, targets, strict=True)]
+
+
+def _find_roots(problem: Posed, parameters: Mapping[str, Any]) -> list[Any]:
+    """The roots of a design of balls; none if a coefficient or an eigenvalue is not finite."""
+    if problem.model.polynomial is None:
+        try:
+            return approximate_eigenvalues(problem.model, problem.parameter_set, parameters)[0]
+        except (ZeroDivisionError, ValueError):
+            return []
+    a = problem.model.coefficients(parameters, problem.parameter_set)
+    return [z for z, m in isolated_roots(a) for _ in range(m)] if all(c.is_finite() for c in a) else []
 
 
 def _list_combinations(rows: Array, residual: Array) -> Iterator[list[int]]:
@@ -306,7 +317,7 @@ def _keep_structure(problem: Posed, design: Numbers, checked: Evaluation, new_ch
         with flint.ctx.workdps(_DIGITS):
             exact = {n: flint.arb(x) for n, x in checked.worst.applied(design).items()}
             a = problem.model.coefficients(exact, problem.parameter_set)
-            exact_roots = nearest_roots(a, checked.structure.roots) or ()
+            exact_roots = (a and nearest_roots(a, checked.structure.roots)) or ()
         roots = tuple(Root(float(r.re), float(r.im), r.multiplicity) for r in exact_roots) or checked.structure.roots
         structure = Structure(checked.structure.name, roots, checked.structure.distance)
     return replace(new_check, structure=structure, violations=checked.violations, amounts=checked.amounts)

@@ -125,19 +125,32 @@ def _find_eigenvalues(model: Model, parameter_set: ParameterSet, parameters: Any
 
 
 def _find_eigenvalues_exactly(model: Model, parameter_set: ParameterSet, parameters: AnyNumbers) -> list[Root]:
-    assert model.pencil is not None
     with flint.ctx.workdps(_DIGITS):
-        matrices = model.pencil(parameter_set.native({n: flint.arb(x) for n, x in parameters.items()}))
-        leading, *others = (flint.acb_mat([[flint.acb(x) for x in row] for row in P]) for P in matrices)
-        n, size = len(matrices[0]), len(others) * len(matrices[0])
-        last_rows = [leading.solve(P).tolist() for P in others[::-1]]
-        rows = [[flint.acb(j == i + n) for j in range(size)] for i in range(size - n)]
-        rows += [[-x for P in last_rows for x in P[i]] for i in range(n)]
-        eigenvalues = flint.acb_mat(rows).eig(algorithm="approx")
-        zero = _ZERO_EIGENVALUE * max(float(abs(z)) for row in rows for z in row)
+        eigenvalues, size = approximate_eigenvalues(
+            model, parameter_set, {n: flint.arb(x) for n, x in parameters.items()}
+        )
         parts = ((float(z.real), float(z.imag)) for z in eigenvalues)
-        pairs = ([x if abs(x) > zero else 0.0 for x in pair] for pair in parts)
+        pairs = ([x if abs(x) > _ZERO_EIGENVALUE * size else 0.0 for x in pair] for pair in parts)
         return [Root(re, im) for re, im in pairs]
+
+
+def approximate_eigenvalues(
+    model: Model, parameter_set: ParameterSet, parameters: AnyNumbers
+) -> tuple[list[Any], float]:
+    """The eigenvalues of a design of balls at the working precision, and the size of the matrix.
+
+    Raises:
+        ZeroDivisionError: if the leading matrix may be singular.
+        ValueError: if the eigenvalues do not converge.
+    """
+    assert model.pencil is not None
+    matrices = model.pencil(parameter_set.native(parameters))
+    leading, *others = (flint.acb_mat([[flint.acb(x) for x in row] for row in P]) for P in matrices)
+    n, size = len(matrices[0]), len(others) * len(matrices[0])
+    last_rows = [leading.solve(P).tolist() for P in others[::-1]]
+    rows = [[flint.acb(j == i + n) for j in range(size)] for i in range(size - n)]
+    rows += [[-x for P in last_rows for x in P[i]] for i in range(n)]
+    return flint.acb_mat(rows).eig(algorithm="approx"), max(float(abs(z)) for row in rows for z in row)
 
 
 def _damping_ratio(values: AnyNumbers) -> float:

@@ -71,7 +71,7 @@ def formulate(
     a0_sign: int = 0,
     counts: Sequence[int] = (),
 ) -> NLP:
-    """Formulate a problem by its pattern, or without a pattern by factors or subspaces. Each max, min and abs becomes a variable.
+    """Formulate a problem by its pattern, or else by factors or subspaces. Each max, min and abs becomes a variable.
 
     Args:
         cases: the variations that the design must withstand; by default only the nominal design.

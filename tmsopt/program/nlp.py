@@ -341,7 +341,8 @@ def scale_of(problem: Posed) -> Scale:
     if problem.model.natural:
         return Scale()
     if problem.model.polynomial is None:
-        return Scale(_power_of_two(np.array([family_of(problem).typical_size])))
+        size = np.array([family_of(problem).typical_size])
+        return Scale(_power_of_two(size[size > 0]))
     columns = coefficients_of(problem, problem.ordered(_spread_designs(problem)))
     a = np.stack(np.broadcast_arrays(*columns), axis=-1)
     a = a.reshape(-1, a.shape[-1])

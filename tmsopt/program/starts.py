@@ -110,7 +110,7 @@ def complete_starts(nlp: NLP, problem: Posed, design: Mapping[str, float]) -> It
 def _compute_roots(nlp: NLP, values: Sequence[Values]) -> list[Roots]:
     """Roots in each case, in the unit of the NLP; none without a polynomial."""
     if values[0].model.polynomial is None:
-        return [np.empty(0)] * len(values)
+        return [np.empty(0, dtype=complex)] * len(values)
     return list(roots(regularise(np.array([[float(c) for c in v.coefficients] for v in values]))) / nlp.unit)
 
 

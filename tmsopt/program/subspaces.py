@@ -6,8 +6,8 @@ The chosen eigenvalues are in blocks of two. With t = s − γ and N = M − γ,
 
 for each block t² + β t + κ with β, κ ≥ 0, and 0 in place of the last vector. So the polynomial Π (t² + β t + κ) of M is
 0 on the chain, and no eigenvalue of the block lies to the right of γ. An odd eigenvalue has a block t + δ, δ ≥ 0. For a
-complex M, t = s − γ − i ω and the block is t² + β t + κ + τ² + i β τ. The lengths s_a, W and c are constants of a start.
-The equations are bilinear, and regular where eigenvalues of one block or of several blocks coincide.
+complex M, t = s − γ − i ω and the block is t² + β t + κ + τ² + i β τ. The lengths s_a, W and c are constants of a
+start. The equations are bilinear, and regular where eigenvalues of one block or of several blocks coincide.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -136,7 +136,7 @@ class MatrixBuilder(ProgramBuilder, Protocol):
     """An NLP under construction, with its problem and the numbers that its formula takes as parameters."""
 
     problem: Posed
-    values: Sequence[Values]
+    values: list[Values]
     numbers: Mapping[str, float]
 
 

@@ -1,13 +1,14 @@
 """Descends from a design by the BFGS method on the eigenvalues, with analytic slopes, to a kink of the objective.
 
 BFGS with a weak Wolfe line search goes on at kinks (Lewis and Overton, Mathematical Programming 141, 2013), but
-converges slowly there and loses digits at multiple eigenvalues; IPOPT goes on from its end. The parameters are functions
-of free variables y: p = p(sin y), with small values resolved where a range contains 0.
+converges slowly there and loses digits at multiple eigenvalues; IPOPT goes on from its end. The parameters are
+functions of free variables y: p = p(sin y), with small values resolved where a range contains 0.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,10 +17,11 @@ from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.algebra.kinds import gradients
 from tmsopt.chains import family_of
 from tmsopt.models.model import ROOTS
-from tmsopt.problem import Case, Posed
+from tmsopt.problem import Posed
 from tmsopt.problem.dependence import WORSE_DIRECTION
 from tmsopt.problem.evaluate import nodes_of
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY
+from tmsopt.program.subspaces import covered_cases
 from tmsopt.program.unit_box import UnitBox
 from tmsopt.records import Array, Complex
 from tmsopt.roots.chains import eigenvectors_of, linearised_slopes
@@ -27,148 +29,149 @@ from tmsopt.roots.chains import eigenvectors_of, linearised_slopes
 _MAX_STEPS = 200
 _ARMIJO, _WOLFE = 1e-4, 0.9  # of the weak Wolfe conditions
 _MAX_TRIALS = 20  # steps of a line search
-_FLAT = 1e-4  # relative decrease over the last steps below which the descent ends
+_FLAT = 1e-4  # relative decrease over the last steps below which IPOPT goes on
 _PATIENCE = 10  # these last steps
 _PENALTY = 10.0  # weight of the excess over a limit, in units of the spread of the objective
 _INSIDE = 0.99999  # a start on a face of the box is moved inside, where the slope by y is not 0
 _DIFFERENCE = 1e-6  # step of y for the slopes of p
 
 
+class _Value(NamedTuple):
+    """The objective with its penalties, and its slope by y."""
+
+    height: float
+    slope: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """The objective with a penalty for violated limits, as a function of y.
+    """The objective plus a penalty for violated limits, as a function of y.
 
     Attributes:
         spread: unit of the objective.
         scales: unit of the excess over each limit.
     """
 
-    problem: Posed
     space: UnitBox
     spread: float
     scales: Array
 
+    @property
+    def problem(self) -> Posed:
+        """The problem."""
+        return self.space.problem
+
     def run(self, design: Mapping[str, float]) -> dict[str, float]:
         """The design where the descent from another one ends."""
-        w = self.space.spread_near_zero(self.space.point(design))
-        y = np.arcsin(np.clip(2 * w - 1, -_INSIDE, _INSIDE))
-        value, slope = self.value(y)
-        if not np.isfinite(value):
+        y = np.arcsin(np.clip(2 * self.space.spread_near_zero(self.space.point(design)) - 1, -_INSIDE, _INSIDE))
+        value = self._value(y)
+        if not np.isfinite(value.height):
             return dict(design)
-        H, values = np.eye(len(y)) / (np.linalg.norm(slope) or 1.0), [value]
+        inverse, heights = np.eye(len(y)) / (np.linalg.norm(value.slope) or 1.0), [value.height]
         for step_count in range(_MAX_STEPS):
-            direction = -H @ slope
-            if not slope @ direction < 0:
+            step, new_value = self._search_line(y, value, -inverse @ value.slope)
+            if not step.any():
                 break
-            step, new_value, new_slope = self._search_line(y, value, slope, direction)
-            if step is None:
-                break
-            s, g = step, new_slope - slope
-            y, value, slope = y + step, new_value, new_slope
-            values.append(value)
-            if s @ g > 0:
+            change = new_value.slope - value.slope
+            y, value, product = y + step, new_value, float(step @ change)
+            heights.append(value.height)
+            if product > 0:
                 if not step_count:
-                    H *= (s @ g) / (g @ g) / H[0, 0]
-                V = np.eye(len(y)) - np.outer(s, g) / (s @ g)
-                H = V @ H @ V.T + np.outer(s, s) / (s @ g)
-            if len(values) > _PATIENCE and values[-_PATIENCE] - value < _FLAT * (abs(value) + 1e-300):
+                    inverse *= product / (change @ change) / inverse[0, 0]
+                projector = np.eye(len(y)) - np.outer(step, change) / product
+                inverse = projector @ inverse @ projector.T + np.outer(step, step) / product
+            if len(heights) > _PATIENCE and heights[-_PATIENCE] - value.height < _FLAT * abs(value.height):
                 break
-        return {n: float(x) for n, x in self._parameters(y).items()}
+        return {n: float(x) for n, x in self._design(y).items()}
 
-    def _search_line(self, y: Array, value: float, slope: Array, direction: Array) -> tuple[Array | None, float, Array]:
-        low, high, t = 0.0, np.inf, 1.0
-        fall = float(slope @ direction)
-        best: tuple[Array | None, float, Array] = (None, value, slope)
-        for _ in range(_MAX_TRIALS):
-            new_value, new_slope = self.value(y + t * direction)
-            if not new_value <= value + _ARMIJO * t * fall:
+    def _search_line(self, y: Array, value: _Value, direction: Array) -> tuple[Array, _Value]:
+        """A step that satisfies the weak Wolfe conditions, or else the longest one with enough decrease, or 0."""
+        low, high, t, fall = 0.0, np.inf, 1.0, float(value.slope @ direction)
+        best = 0 * direction, value
+        for _ in range(_MAX_TRIALS if fall < 0 else 0):
+            new_value = self._value(y + t * direction)
+            if not new_value.height <= value.height + _ARMIJO * t * fall:
                 high = t
-            elif new_slope @ direction < _WOLFE * fall:
-                low, best = t, (t * direction, new_value, new_slope)
+            elif new_value.slope @ direction < _WOLFE * fall:
+                low, best = t, (t * direction, new_value)
             else:
-                return t * direction, new_value, new_slope
+                return t * direction, new_value
             t = (low + high) / 2 if np.isfinite(high) else 2 * low
         return best
 
-    def _parameters(self, y: Array) -> dict[str, Array]:
+    def _design(self, y: Array) -> dict[str, Array]:
         return self.space.designs(self.space.sample_near_zero((1 + np.sin(y)) / 2))
 
-    def value(self, y: Array) -> tuple[float, Array]:
-        """The objective with penalties, and its slope by y; inf where it has no value."""
-        steps = self._parameters(y[None] + _DIFFERENCE * np.array([[0.0], [1.0], [-1.0]]))
-        design = {n: float(x[0]) for n, x in steps.items()}
-        widths = np.array([(x[1] - x[2]) / (2 * _DIFFERENCE) for x in steps.values()])
+    def _value(self, y: Array) -> _Value:
+        columns = self._design(y[None] + _DIFFERENCE * np.array([[0.0], [1.0], [-1.0]]))
+        design = {n: float(x[0]) for n, x in columns.items()}
+        stretches = np.array([(x[1] - x[2]) / (2 * _DIFFERENCE) for x in columns.values()])
+        undefined = _Value(np.inf, np.zeros(len(y)))
         with np.errstate(all="ignore"):
             try:
-                roots, slopes = self._worst_roots(design)
+                roots = self._worst_roots(design)
             except np.linalg.LinAlgError:
-                return np.inf, np.zeros(len(y))
-            columns = {**self.problem.ordered(design), **roots}
-            outputs = np.array([float(x) for x in evaluate_on_arrays(self._formula, columns)])
-        size = len(outputs) // (1 + len(self._names))
-        parts, partial_slopes = outputs[:size], outputs[size:].reshape(size, -1)
-        weights = self._weights(parts)
-        chain = np.stack([slopes[n] if n in slopes else self._unit(n) for n in self._names])
-        slope = (weights @ partial_slopes) @ chain * widths
-        value = float(weights @ parts)
-        return (value, slope) if np.isfinite([value, *slope]).all() else (np.inf, np.zeros(len(y)))
+                return undefined
+            known = {**self.problem.ordered(design), **{n: x for n, (x, _) in roots.items()}}
+            outputs = np.array([float(x) for x in evaluate_on_arrays(self._formula, known)])
+            parts, slopes = np.split(outputs, [len(outputs) // (1 + len(self._names))])
+            weights, names = self._weigh(parts), list(self.problem.free)
+            inputs = np.stack(
+                [roots[n][1] if n in roots else np.array([float(m == n) for m in names]) for n in self._names]
+            )
+            slope = weights @ slopes.reshape(len(parts), -1) @ inputs * stretches
+        value = _Value(float(weights @ parts), slope)
+        return value if np.isfinite([value.height, *slope]).all() else undefined
 
-    def _weights(self, parts: Array) -> Array:
-        has_objective = self.problem.objective is not None
-        weights = np.full(len(parts), 1.0)
-        if has_objective:
-            weights[0] = 1 / self.spread
-        limits = parts[has_objective:]
+    def _weigh(self, parts: Array) -> Array:
+        """Weights of the objective and of the violated limits."""
+        count = len(parts) - len(self.problem.conditions)
         is_equality = np.array([c.equality for c in self.problem.conditions.values()], dtype=bool)
-        signs = np.where(is_equality, np.sign(limits), limits > 0)
-        weights[has_objective:] = _PENALTY * signs / self.scales
-        return weights
-
-    def _unit(self, name: str) -> Array:
-        return np.array([float(n == name) for n in self.problem.free])
+        signs = np.where(is_equality, np.sign(parts[count:]), parts[count:] > 0)
+        return np.array([*[1 / self.spread] * count, *_PENALTY * signs / self.scales])
 
     @property
     def _names(self) -> tuple[str, ...]:
-        return (*self.problem.parameter_set.names, *ROOTS)
+        roots = [n for n in ROOTS if n == "abscissa" or not self.problem.model.is_complex]
+        return (*self.problem.parameter_set.names, *roots)
 
     @cached_property
     def _formula(self) -> Formula:
-        """Objective and conditions, where less is better, and their slopes by parameters and root quantities."""
-        problem = self.problem
-        expressions = {"": problem.objective} if problem.objective else {}
-        nodes = nodes_of(problem, {**expressions, **problem.conditions})
-        signs = [*([problem.sign] if problem.objective else []), *(c.sign for c in problem.conditions.values())]
+        """Objective and limits, where less is better, and their slopes by parameters and root quantities."""
+        problem, symbols = self.problem, [symbol(n) for n in self._names]
+        objectives = {"": problem.objective} if problem.objective else {}
+        nodes = nodes_of(problem, {**objectives, **problem.conditions})
+        signs = [*[problem.sign] * len(objectives), *(c.sign for c in problem.conditions.values())]
         parts = [sign * node for sign, node in zip(signs, nodes.values(), strict=True)]
-        rows = gradients(parts, [symbol(n) for n in self._names])
-        return formula([*parts, *(x for row in rows for x in row)], self._names)
+        return formula([*parts, *(x for row in gradients(parts, symbols) for x in row)], self._names)
 
-    def _worst_roots(self, design: Mapping[str, float]) -> tuple[dict[str, float], dict[str, Array]]:
-        """Root quantities in their worst cases, and their slopes by the free parameters."""
-        problem, found = self.problem, dict[str, tuple[float, Array]]()
-        for case in [case for case in problem.cases if not case.direction] or [Case()]:
+    def _worst_roots(self, design: Mapping[str, float]) -> dict[str, tuple[float, Array]]:
+        """Root quantities in their worst cases, with their slopes by the free parameters."""
+        problem, worst = self.problem, dict[str, tuple[float, Array]]()
+        for case in covered_cases(problem.cases):
             parameters = case.applied(problem.ordered(design))
             family = family_of(problem, parameters)
             matrices, slopes = family.expand(np.array([parameters[n] for n in problem.free]))
             s, left, right = eigenvectors_of(matrices)
-            changes = linearised_slopes(matrices, slopes)
-            n = len(matrices[0])
+            changes, n = linearised_slopes(matrices, slopes), len(matrices[0])
+            for name, value, k, direction in _list_quantities(s):
+                sign = WORSE_DIRECTION[name]
+                if name not in worst or sign * value > sign * worst[name][0]:
+                    worst[name] = value, (direction * (left[k, -n:] @ changes @ right[:, k])).real
+        return worst
 
-            def slope_of(k: int) -> Complex:
-                return left[k, -n:] @ changes @ right[:, k]
 
-            for name, value, k, direction in self._quantities(s):
-                if name not in found or value * WORSE_DIRECTION[name] > found[name][0] * WORSE_DIRECTION[name]:
-                    found[name] = value, (direction * slope_of(k)).real
-        return {n: x for n, (x, _) in found.items()}, {n: slope for n, (_, slope) in found.items()}
-
-    def _quantities(self, s: Complex):
-        k = int(np.argmax(s.real))
-        yield "abscissa", float(s[k].real), k, 1.0
-        k = int(np.argmax(np.abs(s.imag)))
-        yield ANGULAR_FREQUENCY, float(abs(s[k].imag)), k, -1j * np.sign(s[k].imag)
-        if not self.problem.model.is_complex:
-            sizes = np.abs(s) + 1e-300
-            k = int(np.argmin(-s.real / sizes))
-            z, r = s[k], sizes[k]
-            # d(−Re s/|s|) = Re((−1/|s| + Re s conj(s)/|s|³) ds)
-            yield "damping_ratio", float(-z.real / r), k, -1 / r + z.real * z.conjugate() / r**3
+def _list_quantities(s: Complex) -> Iterator[tuple[str, float, int, complex]]:
+    """Name, value and eigenvalue s_k of each root quantity, and d with d(value) = Re(d · d s_k)."""
+    k = int(np.argmax(s.real))
+    yield "abscissa", float(s[k].real), k, 1.0
+    k = int(np.argmax(np.abs(s.imag)))
+    yield ANGULAR_FREQUENCY, float(abs(s[k].imag)), k, -1j * float(np.sign(s[k].imag))
+    sizes = np.abs(s)
+    k = int(np.argmin(-s.real / sizes))
+    yield (
+        "damping_ratio",
+        float(-s[k].real / sizes[k]),
+        k,
+        complex(s[k].real * s[k].conj() / sizes[k] ** 2 - 1) / sizes[k],
+    )

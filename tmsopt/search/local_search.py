@@ -17,7 +17,10 @@ from tmsopt.search.subspace_search import solve_by_subspaces
 
 
 def solve_from(state: SearchState, start: Start) -> LocalEnd:
-    """Solve from one start; without a polynomial, by subspaces. While IPOPT does not converge and restarts help, restart at its end with new factors."""
+    """Solve from one start; without a polynomial, by subspaces.
+
+    While IPOPT does not converge and restarts help, it starts again at its end with new factors.
+    """
     if state.part.model.polynomial is None and state.part.pattern is None:
         return _add_led_designs(state, solve_by_subspaces(state, start))
     tuning, is_exact = state.tuning, state.nlp.cases and state.nlp.has_exact_starts

@@ -89,7 +89,7 @@ def assess_best(state: SearchState, starts: Starts, cases: Sequence[Case] | None
         surplus = f"{freedom.conditions} conditions for {freedom.free} free parameters"
         notes += (f"{surplus} are inconsistent{_suggest_balance(problem, -freedom.count)}",)
     branches: tuple[OtherBranch, ...] = ()
-    if freedom.kind == "square":
+    if freedom.kind == "square" and problem.model.polynomial is not None:
         equations = formulate_matching(problem) if problem.pattern else formulate_by_factors(problem)
         branches = _find_other_branches(problem, nlp if not nlp.kinks else equations, parameters)
     active_gains = find_active_limits(problem, nlp, trial.point)
@@ -252,7 +252,12 @@ def demote_if_unbounded(state: SearchState, outcome: Outcome) -> Outcome:
             return outcome
         return replace(outcome, has_no_best_design=True, notes=(UNBOUNDED,))
     has_runaway = has_runaway_root(outcome.checked.structure.roots, state.tuning.infinite_root_size)
-    if outcome.status != "optimal" or not has_runaway or _is_a0_limited(problem, outcome):
+    if (
+        outcome.status != "optimal"
+        or not has_runaway
+        or problem.model.polynomial is None
+        or _is_a0_limited(problem, outcome)
+    ):
         return outcome
     note = (
         f"no best design: the objective improves towards a singular mass matrix (a0 = 0); {write_mass_advice(problem)}"

@@ -28,7 +28,7 @@ from tmsopt.problem import (
     unit_of,
 )
 from tmsopt.problem.dependence import sense_notes
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY
+from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
 from tmsopt.problem.real_form import RealForm, has_real_form, real_form
 from tmsopt.problem.symmetry import find_symmetry
 from tmsopt.problem.verdict.stability import stability
@@ -131,7 +131,7 @@ def solve_any_status(
     ):
         notes = (*sense_notes(problem), *_describe_hermitian(problem))
         return _assemble(problem, outcome, notes, {}, began, with_bound)
-    form = real_form(problem) if problem.asks_radius or problem.pattern else RealForm(problem)
+    form = real_form(problem) if _needs_polynomial(problem) else RealForm(problem)
     policy = replace(policy, sample=lambda _: None) if without_sample else policy
     solution = _search_box(form.problem, options, extra_starts, skipped_parts, with_bound, policy)
     if not (without_sample or solution.interrupted):
@@ -148,6 +148,12 @@ def solve_any_status(
         if problem.pattern.name in checked.violations:
             solution = replace(solution, status="not_converged", violations=checked.amounts)
     return replace(solution, notes=(*solution.notes, *_describe_hermitian(problem)))
+
+
+def _needs_polynomial(problem: Posed) -> bool:
+    """Whether a search uses factors of the polynomial, although matrices may have none."""
+    names = (RADIUS, "damping_ratio", ANGULAR_FREQUENCY)
+    return problem.pattern is not None or any(problem.asks(name) for name in names)
 
 
 def _search_box(
@@ -234,9 +240,10 @@ def _search_sides(states: Sequence[SearchState], policy: Policy) -> list[Searche
 def add_worst_case_proof(solution: Solution) -> Solution:
     """Try to prove that an optimum has no worse case between the listed cases; add the result to the optimum."""
     problem = solution.problem.posed
-    if solution.status != "optimal" or solution.cover or not (problem.scenarios or problem.tolerances):
+    has_cases = bool(problem.scenarios or problem.tolerances)
+    if solution.status != "optimal" or solution.cover or not has_cases or not has_real_form(problem.model):
         return solution
-    return replace(solution, cover=prove_worst_case(problem, solution.parameters, solution.abscissa))
+    return replace(solution, cover=prove_worst_case(real_form(problem).problem, solution.parameters, solution.abscissa))
 
 
 def solve_if_needed(problem: ProblemSource, progress: Listener | None) -> Solution:

@@ -31,6 +31,7 @@ _MIN_RADIUS = 1e-7
 _SHRINK, _GROW = 0.25, 3.0
 _NEAR_LINE = 0.05  # of the size of the eigenvalues: those nearer to the rightmost one are in the first subspace
 _CROSSING = 1e-9  # of the size of the eigenvalues: an eigenvalue farther to the right of the line has crossed it
+_WORSE = 1e-7  # relative difference of objectives that the interior-point method may leave
 _PROGRESS = 1e-12  # relative improvement of the objective below which the search ends
 _AT_END = 0.99  # of the trust region: a step that is longer may go on
 
@@ -53,7 +54,9 @@ def solve_by_subspaces(state: SearchState, start: Start) -> LocalEnd:
             has_crossed = trial.feasible and _has_crossed(part, spectra, trial)
         except np.linalg.LinAlgError:
             break
-        if not trial.feasible or has_crossed or trial.rank > start_end.rank:
+        tolerance = _WORSE * (nlp.size + abs(trial.objective))
+        is_worse = start_end.feasible and trial.objective > start_end.objective + tolerance
+        if not trial.feasible or has_crossed or is_worse:
             radius *= _SHRINK
             extra += 2 * has_crossed
             if radius < _MIN_RADIUS:
@@ -71,10 +74,11 @@ def solve_by_subspaces(state: SearchState, start: Start) -> LocalEnd:
 
 
 def _descend(state: SearchState, space: UnitBox, design: Mapping[str, float]) -> dict[str, float]:
+    """The design where the descent from another one ends, in the units of the sample."""
     spread, scales = 1.0, np.ones(len(state.part.conditions))
     if state.sample:
         spread, scales = state.sample.spread or 1.0, state.sample.box.scales
-    return clip_to_box(state.part, Descent(state.part, space, spread, scales).run(design))
+    return clip_to_box(state.part, Descent(space, spread, scales).run(design))
 
 
 @lru_cache(maxsize=16)
@@ -118,7 +122,9 @@ def _run_ipopt(
         excesses = np.maximum(np.array(variant.row_lower) - rows, rows - np.array(variant.row_upper)).clip(0)
         is_finite = bool(np.all(np.isfinite([f, *rows, *run.x])))
         is_feasible = is_finite and bool(excesses.max(initial=0.0) <= state.tuning.feasible_violation)
-        return LocalEnd(start, replace(variant, lower=lower, upper=upper), run, f if is_finite else math.inf, is_feasible)
+        return LocalEnd(
+            start, replace(variant, lower=lower, upper=upper), run, f if is_finite else math.inf, is_feasible
+        )
 
     variants = [*islice(limited.impose_contacts(x), state.tuning.max_variants)]
     runs = [make_ipopt(nlp, state.options, "near")(x, variant) for variant in variants]
