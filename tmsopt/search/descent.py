@@ -132,8 +132,7 @@ class Descent:
 
     @property
     def _names(self) -> tuple[str, ...]:
-        roots = [n for n in ROOTS if n == "abscissa" or not self.problem.model.is_complex]
-        return (*self.problem.parameter_set.names, *roots)
+        return (*self.problem.parameter_set.names, *(n for n in ROOTS if self.problem.asks(n)))
 
     @cached_property
     def _formula(self) -> Formula:
@@ -167,7 +166,7 @@ def _list_quantities(s: Complex) -> Iterator[tuple[str, float, int, complex]]:
     yield "abscissa", float(s[k].real), k, 1.0
     k = int(np.argmax(np.abs(s.imag)))
     yield ANGULAR_FREQUENCY, float(abs(s[k].imag)), k, -1j * float(np.sign(s[k].imag))
-    sizes = np.abs(s)
+    sizes = np.abs(s) + np.finfo(float).tiny
     k = int(np.argmin(-s.real / sizes))
     yield (
         "damping_ratio",

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from tmsopt.algebra.formula import Formula, Node, UnsupportedOperation, constant, formula, symbol
-from tmsopt.algebra.intervals import Interval, ranges
+from tmsopt.algebra.formula import Formula, Node, constant, formula, symbol
+from tmsopt.algebra.intervals import Interval
 from tmsopt.algebra.kinds import values
 from tmsopt.models.model import Matrices, Matrix, Model
 from tmsopt.models.stated.pairs import Pair, list_parts, pair
@@ -26,9 +26,7 @@ from tmsopt.roots.polynomial import characteristic_polynomial, product
 _NEGLIGIBLE = 2.0**-300  # a smaller spread comes from rounding, and its carrier would underflow
 _MIN_SPREAD = 1e-6  # least spread, relative to the largest frequency; a smaller one would not save digits
 _SAMPLE_SIZE = 256  # designs of a sample of the ranges
-_WIDENING = 2.0  # a range of values in a sample is widened by this factor
 _SPREAD_FACTOR = 1.25  # the spread in a sample is multiplied by this factor
-_MIN_SHARE = 1 / 64  # least spread from a sample, relative to the proven spread
 _MAX_CORNER_PARAMETERS = 8  # with more parameters, a sample does not contain the corners of the ranges
 _STEPS = 32  # a carrier is a multiple of its size divided by this, so that similar ranges have the same carrier
 
@@ -104,47 +102,28 @@ def carrier_for(middle: float, spread: float) -> float:
 
 
 def _bound_frequencies(entries: Sequence[Node], box: Mapping[str, Interval]) -> tuple[float, float]:
-    """The middle and the spread of Re ω = −Im s; the spread is at least max |Im ω|.
-
-    Re s and Im s lie in the ranges of the eigenvalues of (A + A*)/2 and (A − A*)/2i. Gershgorin's discs bound these
-    eigenvalues. Intervals bound the entries, or a sample if intervals give no bound, as for 1/x. The discs may be far
-    too wide, and a large carrier costs digits, so the eigenvalues at a sample of designs show the actual spread. This
-    is safe: a root meets the conjugate of another root only if the true spread is more than twice as large.
+    """The middle and the spread of Re ω = −Im s at designs spread over a box; the spread is at least max |Im ω|.
 
     Args:
         entries: real and imaginary part of each entry of A.
     """
-    matrix, intervals, n = formula(entries, box), [*box.values()], math.isqrt(len(entries) // 2)
-    R, J = (np.array(part, dtype=object).reshape(n, n) for part in (entries[::2], entries[1::2]))
-    is_off_diagonal = ~np.eye(n, dtype=bool)
-    off_diagonal = [x for P in (J + J.T, R - R.T, R + R.T, J - J.T) for x in (P / 2)[is_off_diagonal]]
-    disc_parts = formula([*-J.diagonal(), *R.diagonal(), *off_diagonal], matrix.names)
-    part_ranges = np.array(_bound_outputs(disc_parts, intervals))
-    sizes = np.split(np.abs(part_ranges[2 * n :]).max(axis=1), 4) if off_diagonal else [np.zeros(0)] * 4
-    ends = []
-    for diagonal, re, im in ((part_ranges[:n], *sizes[:2]), (part_ranges[n : 2 * n], *sizes[2:])):
-        radius = np.hypot(re, im).reshape(n, -1).sum(axis=1)
-        ends.append(((diagonal[:, 0] - radius).min(), (diagonal[:, 1] + radius).max()))
-    (low, high), loss = ends[0], np.abs(ends[1]).max()
-    spread = float(max((high - low) / 2, loss))
-    sample = _sample_frequencies(matrix, n, intervals) if any(lo < hi for lo, hi in intervals) else np.zeros(0)
-    if sample.size:
-        sample_low, sample_high = sample.real.min(), sample.real.max()
-        sample_spread = _SPREAD_FACTOR * max((sample_high - sample_low) / 2, np.abs(sample.imag).max())
-        if sample_spread < spread:
-            low, high, spread = sample_low, sample_high, float(max(sample_spread, _MIN_SHARE * spread))
+    sample = _sample_frequencies(formula(entries, box), math.isqrt(len(entries) // 2), [*box.values()])
+    if not sample.size:
+        return 0.0, 1.0
+    low, high = float(sample.real.min()), float(sample.real.max())
+    spread = _SPREAD_FACTOR * max((high - low) / 2, float(np.abs(sample.imag).max()))
     spread = max(spread, _MIN_SPREAD * max(abs(low), abs(high)))  # equal entries have a spread from rounding only
-    return float(low + high) / 2, spread if spread > _NEGLIGIBLE else 1.0
+    return (low + high) / 2, spread if spread > _NEGLIGIBLE else 1.0
 
 
 def _sample_frequencies(matrix: Formula, n: int, box: Sequence[Interval]) -> Any:
-    """ω at designs in a box, with its corners if they are few; empty if A is not finite there."""
+    """ω at designs in a box, with its corners if they are few; empty if A is finite nowhere."""
     points = _unit_points(len(box))
     if len(box) <= _MAX_CORNER_PARAMETERS:
         points = np.concatenate([points, np.array(list(combinations((0.0, 1.0), repeat=len(box))))])
     entries = _evaluate(matrix, box, points)
     A = (entries[::2] + 1j * entries[1::2]).T.reshape(-1, n, n)
-    return 1j * np.linalg.eigvals(A) if np.isfinite(A).all() else np.zeros(0)
+    return 1j * np.linalg.eigvals(A[np.isfinite(A).all(axis=(1, 2))])
 
 
 def _evaluate(outputs: Formula, box: Sequence[Interval], points: Array) -> Array:
@@ -162,18 +141,3 @@ def _unit_points(size: int) -> Array:
     steps = 1 / np.sqrt([2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41])
     points = np.modf(np.outer(np.arange(_SAMPLE_SIZE), steps))[0]
     return np.asarray(points[:, np.arange(size) % len(steps)])
-
-
-def _bound_outputs(outputs: Formula, box: Sequence[Interval]) -> list[Interval]:
-    """Ranges of the outputs of a formula over a box, by intervals, or else by a sample."""
-    try:
-        proven_ranges = ranges(outputs, box)
-        if all(math.isfinite(x) for ends in proven_ranges for x in ends):
-            return proven_ranges
-    except UnsupportedOperation:
-        pass
-    sample = _evaluate(outputs, box, _unit_points(len(box)))
-    sample = np.where(np.isfinite(sample), sample, 0.0)
-    low, high = sample.min(axis=1), sample.max(axis=1)
-    margin = (_WIDENING - 1) * np.maximum(high - low, 0.0) / 2
-    return list(zip((low - margin).tolist(), (high + margin).tolist(), strict=True))
