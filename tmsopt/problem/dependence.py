@@ -1,5 +1,6 @@
 """Finds whether expressions depend on the case, and in which direction root quantities improve them."""
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -57,6 +58,15 @@ def rewards_change_of(problem: Posed, name: str, direction: float = 1.0) -> bool
     return any(e is not None and _can_fall(problem, sign, e, name, direction) for sign, e in terms)
 
 
+def _mean_root_size(values: Values) -> float:
+    """The geometric mean of |s| over the roots of a design; 1 if a root is infinite."""
+    if values.model.polynomial is None:
+        sizes = [r.size for r in values["structure"].roots for _ in range(r.multiplicity)]
+        return math.prod(x ** (1 / len(sizes)) for x in sizes)
+    a = [float(c) for c in values.coefficients]
+    return abs(a[-1] / a[0]) ** (1 / values.model.degree) if a[0] else 1.0
+
+
 def stability_limit(problem: Posed, least_decay: float = _LEAST_DECAY) -> dict[str, str]:
     """Name → a constraint that keeps designs stable; empty if neither the limits nor the objective require it.
 
@@ -70,8 +80,7 @@ def stability_limit(problem: Posed, least_decay: float = _LEAST_DECAY) -> dict[s
     if problem.pattern or not any(name in roots and problem.asks(name) for name in roots):
         return {}
     values = problem.values(problem.ordered({n: (lo + hi) / 2 for n, (lo, hi) in problem.free.items()}))
-    a = [float(c) for c in values.coefficients]
-    size = abs(a[-1] / a[0]) ** (1 / problem.model.degree) if a[0] else 1.0
+    size = _mean_root_size(values)
 
     def is_excluded(abscissa: float, ratio: float) -> bool:
         """Whether a limit excludes roots with these values."""

@@ -109,7 +109,7 @@ def real_form(problem: Posed) -> RealForm:
     model = problem.model
     if not has_real_form(model):
         accepted = "A up to 12 × 12, M, D, K up to 6 × 6, complex H and A up to 6 × 6"
-        can = "locate a pattern, prove it, list all points with --all, or draw `tmsopt chart` and `tmsopt sheets`"
+        can = "minimise the abscissa, locate a pattern, prove it, list all points with --all, or draw `tmsopt chart`"
         raise input_error(
             f"needs the characteristic polynomial; accepted here: {accepted}; larger ones: {can}", "model"
         )

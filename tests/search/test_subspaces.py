@@ -1,0 +1,129 @@
+"""The least abscissa of matrices without a polynomial, beside closed forms and eigenvalues at 40 digits."""
+
+import mpmath
+import numpy as np
+import pytest
+
+import tmsopt
+from tmsopt.models import from_hamiltonian, from_matrices
+
+EXACT = 1e-13  # of the size of the eigenvalues
+
+
+def chain(size, H=None):
+    """A mode chain with a weak loss each, and a block in its first entries."""
+    rows = [[f"{i} - 1j" if i == j else 0 for j in range(size)] for i in range(size)]
+    for i, row in enumerate(H or []):
+        rows[i][: len(row)] = row
+    return from_hamiltonian(rows)
+
+
+DIMER = [["d - 1j*g", "k"], ["k", "-0.2j"]]
+"""Beyond k = |g − 0.2|/2, both modes lose (g + 0.2)/2; before, the slower one loses less."""
+
+
+@pytest.mark.parametrize("size", [2, 7, pytest.param(20, marks=pytest.mark.slow)])
+def test_a_lossy_dimer_loses_its_mean_beside_any_number_of_modes(size):
+    problem = tmsopt.Problem(
+        chain(size, DIMER), free={"d": (-1, 1), "g": (0.0, 1.0), "k": (0.0, 0.3)}, minimize="abscissa"
+    )
+    found = tmsopt.solve(problem)
+    assert found.status == "optimal"
+    assert found.parameters["g"] == pytest.approx(0.8, abs=1e-7)  # the EP2 at the greatest coupling 0.3
+    assert found.abscissa == pytest.approx(-0.5, abs=EXACT)
+    assert found.structure == "EP2"
+    assert "k.max" in found.active
+
+
+@pytest.mark.slow
+def test_an_ep2_beside_a_single_mode_has_the_digits_of_40():
+    """Three parameters put an EP2 and a third eigenvalue on one line; Newton's method at 40 digits finds it too."""
+    rng = np.random.default_rng([11, 6, 3])
+    H = [np.round(rng.normal(size=(6, 6)) + 1j * rng.normal(size=(6, 6)), 2) for _ in range(4)]
+    rows = [
+        ["".join(f" + ({M[i, j]})*{n}" for M, n in zip(H, ("1", "x", "y", "z"), strict=True)) for j in range(6)]
+        for i in range(6)
+    ]
+    found = tmsopt.solve(
+        tmsopt.Problem(from_hamiltonian(rows), free=dict.fromkeys("xyz", (-1, 1)), minimize="abscissa")
+    )
+    assert (found.status, found.structure) == ("optimal", "EP2+single")
+    with mpmath.workdps(40):
+        matrices = [mpmath.matrix([[mpmath.mpc(str(z.real), str(z.imag)) for z in row] for row in M]) for M in H]
+
+        def equations(x, y, z, re, double, single):
+            A = -1j * (matrices[0] + x * matrices[1] + y * matrices[2] + z * matrices[3])
+            step = mpmath.mpf(10) ** -18
+
+            def p(s):
+                return mpmath.det(A - s * mpmath.eye(6))
+
+            s = mpmath.mpc(re, double)
+            values = p(s), (p(s + step) - p(s - step)) / (2 * step), p(mpmath.mpc(re, single))
+            return [part for v in values for part in (v.real, v.imag)]
+
+        pair = next(r for r in found.roots if r.multiplicity == 2)
+        other = next(r for r in found.roots if r.multiplicity == 1)
+        start = [*(found.parameters[n] for n in "xyz"), pair.re, pair.im, other.im]
+        least = float(mpmath.findroot(equations, start, tol=1e-25, verify=False)[3])
+    assert found.abscissa == pytest.approx(least, abs=1e-13)
+
+
+@pytest.mark.slow
+def test_a_limit_on_the_decay_of_seven_oscillators():
+    """x″ + c x′ + k x, and others with more stiffness: the decay rate is c/2 up to c = 2 √k, so a rate a needs k ≥ a²."""
+    n = 7
+    block = [[0] * n + [int(i == j) for j in range(n)] for i in range(n)]
+    stiff = [[f"-k*{1 + i / n}" if i == j else 0 for j in range(n)] for i in range(n)]
+    lower = [[*row, *("-c" if i == j else 0 for j in range(n))] for i, row in enumerate(stiff)]
+    model = from_matrices(A=block + lower)
+    problem = tmsopt.Problem(
+        model, free={"k": (0.1, 4.0), "c": (0.0, 3.0)}, minimize="c + k", constraints={"decay": "abscissa <= -0.5"}
+    )
+    found = tmsopt.solve(problem)
+    assert found.status == "optimal"
+    assert dict(found.parameters) == pytest.approx({"k": 0.25, "c": 1.0}, abs=1e-6)
+    assert found.abscissa_realised <= -0.5 + 1e-9
+
+
+def test_the_worst_of_two_scenarios():
+    """With losses g and 1.4 − g of two modes that are not coupled, the least loss is greatest at g = 0.7."""
+    model = from_hamiltonian([["-1j*(g + e)", 0], [0, "2 - 1j*(1.4 - g + e)"]])
+    problem = tmsopt.Problem(model, free={"g": (0.0, 1.4)}, scenarios={"e": [0.0, 0.1]}, minimize="abscissa")
+    found = tmsopt.solve(problem)
+    assert found.parameters["g"] == pytest.approx(0.7, abs=1e-8)
+    assert found.abscissa == pytest.approx(-0.7, abs=1e-8)
+    assert found.worst is not None
+    assert found.worst.at["e"] == 0.0
+
+
+@pytest.mark.slow
+def test_a_limit_that_no_loss_reaches_is_infeasible():
+    problem = tmsopt.Problem(
+        chain(7, DIMER),
+        free={"d": (-1, 1), "g": (0.0, 1.0), "k": (0.0, 0.3)},
+        minimize="k",
+        constraints={"loss": "abscissa <= -2"},
+    )
+    found = tmsopt.solve(problem, throw=False)
+    assert found.status == "infeasible"
+    assert found.violations
+
+
+def test_an_exceptional_point_within_a_limit_on_the_loss():
+    """EP2 at k = |g − 0.2|/2 with the loss (g + 0.2)/2 ≥ 0.4: the least coupling is 0.2."""
+    problem = tmsopt.Problem(
+        chain(2, DIMER),
+        free={"d": (-1, 1), "g": (0.3, 1.0), "k": (0.01, 1.0)},
+        locate="EP2",
+        minimize="k",
+        constraints={"loss": "abscissa <= -0.4"},
+    )
+    found = tmsopt.solve(problem)
+    assert dict(found.parameters) == pytest.approx({"d": 0.0, "g": 0.6, "k": 0.2}, abs=1e-7)
+
+
+def test_a_damping_ratio_needs_the_polynomial():
+    model = from_matrices(A=[["-a" if i == j else 0 for j in range(13)] for i in range(13)])
+    with pytest.raises(tmsopt.InputError, match="characteristic polynomial"):
+        tmsopt.solve(tmsopt.Problem(model, free={"a": (0.1, 1)}, maximize="damping_ratio"))
