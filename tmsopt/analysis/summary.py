@@ -11,13 +11,15 @@ from tmsopt.models.expression import Expression
 from tmsopt.models.user_spectrum import describe_user_structure
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ROOT_QUANTITIES, matrices_at
-from tmsopt.problem.real_form import has_real_form, real_form
 from tmsopt.problem.solution import Bound, Solution
 from tmsopt.problem.unit_system import Unit, round_one_way, unit_of
+from tmsopt.program import scale_of
+from tmsopt.roots.chains import linearise_batch
 
 _ROOT_NAMES = {q.name for q in ROOT_QUANTITIES}
 _NO_UNIT = Unit()
 _RANGE_SHARES = (0.0, 0.29, 0.5, 0.83, 1.0)  # shares of a range at which the effect of a parameter is evaluated
+_MAX_COEFFICIENTS = 12  # largest matrix whose characteristic coefficients are computed
 _ROUNDING = 1e-13  # relative rounding error of a few operations
 _BOUND_DISTANCE = 1e-12  # largest relative distance to a bound for which the bound counts as reached
 
@@ -148,15 +150,22 @@ def _warn_of_idle_parameter(solution: Solution, name: str) -> str:
 def _evaluate_signature(
     problem: Posed, parameters: dict[str, float], expressions: Iterable[Expression]
 ) -> tuple[list[float], list[float]]:
-    """Monic coefficients, and the values of expressions with fixed root quantities."""
-    values = problem.values(problem.ordered(parameters))
-    if not has_real_form(problem.model):
-        entries = matrices_at(problem.model, problem.parameter_set, parameters).ravel()
-        return [*entries.real, *entries.imag], [float(e(values)) for e in expressions]
-    a = np.array([float(c) for c in real_form(problem).problem.values(problem.ordered(parameters)).coefficients])
-    values = values.with_known(dict.fromkeys(_ROOT_NAMES, 0.5))
+    """Monic coefficients in the unit of the roots, and the values of expressions with fixed root quantities.
+
+    Large matrices give their entries instead of coefficients.
+    """
+    values, unit = problem.values(problem.ordered(parameters)), scale_of(problem).unit
     with np.errstate(all="ignore"):
-        return list(a / a[0]), [float(e(values)) for e in expressions]
+        if problem.model.polynomial is not None:
+            a = np.array([float(c) for c in values.coefficients])
+            signature = a / a[0] / unit ** np.arange(len(a))
+        else:
+            state, is_defined = linearise_batch(matrices_at(problem.model, problem.parameter_set, parameters) + 0j)
+            state = np.where(is_defined, state / unit, np.nan)
+            is_small = is_defined and len(state) <= _MAX_COEFFICIENTS
+            signature = np.poly(state) if is_small else state.ravel()
+        values = values.with_known(dict.fromkeys(_ROOT_NAMES, 0.5))
+        return [*signature.real, *signature.imag], [float(e(values)) for e in expressions]
 
 
 def _is_varying(rows: list[list[float]]) -> bool:

@@ -133,7 +133,10 @@ class _Group(click.Group):
                 if solution is None:
                     raise
                 status = solution.status.replace("_", " ")
-                click.echo(f"{solution.problem.title}: {status}; there is no design to examine", err=True)
+                click.echo(
+                    f"{solution.problem.title}: {status}; there is no {solution.problem.posed.model.noun} to examine",
+                    err=True,
+                )
                 sys.exit(STATUSES[solution.status])
 
 

@@ -38,7 +38,7 @@ from tmsopt.records import Array, Table, plain
 SECONDS = 60.0
 """Default time limit of a proof."""
 
-_SINGULAR = "the equations are (nearly) singular there: the design is one of a continuum, or two designs meet"
+_SINGULAR = "the equations are (nearly) singular there: the solution is one of a continuum, or two solutions meet"
 _TIME_OUT = "time limit reached"
 _STOPPED = "interrupted"
 # Multiplies the usual unit of the roots: many roots have the size 1, which separates small roots from large ones.
