@@ -127,3 +127,13 @@ def test_a_damping_ratio_needs_the_polynomial():
     model = from_matrices(A=[["-a" if i == j else 0 for j in range(13)] for i in range(13)])
     with pytest.raises(tmsopt.InputError, match="characteristic polynomial"):
         tmsopt.solve(tmsopt.Problem(model, free={"a": (0.1, 1)}, maximize="damping_ratio"))
+
+
+def test_complex_masses_in_any_unit_of_time():
+    """Modes s² + (c + i e) s + (9 + 6 i e) w²: at e = 0 the decay is fastest for c = 6 w, where s = −3 w twice."""
+    w = 1e4
+    D, K = [["c + 1j*e", 0], [0, f"{8 * w}"]], [[f"{9 * w * w} + 1j*e*{3 * w}", 0], [0, f"{16 * w * w}"]]
+    model = from_matrices(M=[[1, 0], [0, 1]], D=D, K=K)
+    found = tmsopt.solve(tmsopt.Problem(model, fixed={"e": 0.0}, free={"c": (w, 12 * w)}, minimize="abscissa"))
+    assert found.parameters["c"] == pytest.approx(6 * w, rel=1e-7)
+    assert found.abscissa == pytest.approx(-3 * w, rel=1e-12)

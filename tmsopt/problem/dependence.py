@@ -62,7 +62,7 @@ def _mean_root_size(values: Values) -> float:
     """The geometric mean of |s| over the roots of a design; 1 if a root is infinite."""
     if values.model.polynomial is None:
         sizes = [r.size for r in values["structure"].roots for _ in range(r.multiplicity)]
-        return math.prod(x ** (1 / len(sizes)) for x in sizes)
+        return float(math.prod(x ** (1 / len(sizes)) for x in sizes))
     a = [float(c) for c in values.coefficients]
     return abs(a[-1] / a[0]) ** (1 / values.model.degree) if a[0] else 1.0
 

@@ -40,7 +40,7 @@ def formulate_chains(problem: Posed, targets: Sequence[Target], point: Exception
     nlp = epigraph_form(build.finish("chains"), needs_two_sided_bounds(problem))
     design = dict(zip(problem.free, point.p.tolist(), strict=True))
     if problem.model.polynomial is None:
-        nlp = start_subspaces(nlp, problem, find_spectra(problem, design, nlp.cases))
+        nlp = start_subspaces(nlp, problem, find_spectra(nlp, problem, design))
     return nlp, initial_point(nlp, problem, design, is_near=True, known=x)
 
 

@@ -44,7 +44,7 @@ _DEPENDENT = 1e-9  # relative singular value of the vectors of a chain below whi
 
 @dataclass(frozen=True)
 class Spectrum:
-    """The eigenvalues of one design, and the invariant subspace of the rightmost ones.
+    """The eigenvalues of one design, and the invariant subspace of the rightmost ones, in the unit of the NLP.
 
     Attributes:
         eigenvalues: the chosen ones, in the order of their blocks.
@@ -96,20 +96,22 @@ def default_count(degree: int) -> int:
     return degree if degree <= _MAX_WHOLE else 2
 
 
-def find_spectra(problem: Posed, design: Numbers, cases: Sequence[Case], counts: Iterable[int] = ()) -> list[Spectrum]:
-    """The rightmost eigenvalues of a design in each case that root quantities cover.
+def find_spectra(nlp: NLP, problem: Posed, design: Numbers, counts: Iterable[int] = ()) -> list[Spectrum]:
+    """The rightmost eigenvalues of a design in each case of an NLP that root quantities cover.
 
     Args:
-        cases: those of the NLP.
         counts: numbers of eigenvalues; by default `default_count`.
     """
-    model, covered = problem.model, covered_cases(cases)
-    return [
-        find_spectrum(
-            matrices_at(model, problem.parameter_set, case.applied(problem.ordered(design))), model.is_complex, count
-        )
-        for case, count in zip(covered, counts or [default_count(model.degree)] * len(covered), strict=True)
-    ]
+    every, model = case_matrices(nlp, problem, design), problem.model
+    counts = counts or [default_count(model.degree)] * len(every)
+    return [find_spectrum(P, model.is_complex, count) for P, count in zip(every, counts, strict=True)]
+
+
+def case_matrices(nlp: NLP, problem: Posed, design: Numbers) -> list[Complex]:
+    """The matrices of a design in each case of an NLP that root quantities cover, for s in the unit of the NLP."""
+    model, parameter_set, nominal = problem.model, problem.parameter_set, problem.ordered(design)
+    every = [matrices_at(model, parameter_set, case.applied(nominal)) for case in covered_cases(nlp.cases)]
+    return [P / nlp.unit ** np.arange(len(P))[:, None, None] for P in every]
 
 
 def covered_cases(cases: Sequence[Case]) -> list[Case]:
@@ -235,13 +237,12 @@ def start_subspaces(nlp: NLP, problem: Posed, spectra: Sequence[Spectrum]) -> NL
     Args:
         spectra: for each case that the root quantities cover.
     """
-    unit, is_complex = nlp.unit, problem.model.is_complex
-    chosen = np.concatenate([one.eigenvalues for one in spectra]) / unit
+    is_complex, chosen = problem.model.is_complex, np.concatenate([one.eigenvalues for one in spectra])
     right, size = float(chosen.real.max()), float(np.abs(chosen - chosen.mean() * is_complex).mean())
     gamma = right + _MARGIN * (size or 1.0)
     numbers, guess = dict(nlp.numbers), [gamma]
     for case, one in zip(covered_indices(nlp.cases), spectra, strict=True):
-        values, lengths, vectors = _make_chain(one, gamma, unit, is_complex)
+        values, lengths, vectors = _make_chain(one, gamma, is_complex)
         guess += [*values, *_parts(vectors, is_complex)]
         name = f"subspace.{case}"
         numbers |= {f"{name}.length.{k}": float(x) for k, x in enumerate(lengths)}
@@ -260,9 +261,9 @@ def _parts(vectors: Complex, is_complex: bool) -> list[float]:
     )
 
 
-def _make_chain(spectrum: Spectrum, gamma: float, unit: float, is_complex: bool) -> tuple[list[float], Array, Complex]:
+def _make_chain(spectrum: Spectrum, gamma: float, is_complex: bool) -> tuple[list[float], Array, Complex]:
     """The values of the blocks, the lengths of the vectors before they become 1, and the vectors as rows."""
-    M, t, values = spectrum.state_matrix / unit, spectrum.eigenvalues / unit - gamma, list[float]()
+    M, t, values = spectrum.state_matrix, spectrum.eigenvalues - gamma, list[float]()
     x, count = spectrum.basis.sum(axis=1), len(spectrum.eigenvalues)
     vectors, lengths = [x], list[float]()
     for a in range(0, count, 2):

@@ -174,6 +174,19 @@ def size_at(matrices: Complex, s: complex) -> float:
     return float(sum(abs(s) ** (d - k) * np.linalg.norm(P, 2) for k, P in enumerate(matrices))) or 1.0
 
 
+def scale_time(matrices: Complex) -> tuple[Complex, float]:
+    """The matrices for s in a unit, a power of 2, in which none is larger than the first one, and this unit.
+
+    With d = 1 the linearised matrix has the same rounding errors in every unit, so the unit is 1.
+    """
+    sizes = np.linalg.norm(matrices, axis=(-2, -1))
+    steps = np.arange(1, len(matrices))
+    ratios = (sizes[1:] / sizes[0]) ** (1 / steps) if len(matrices) > 2 and sizes[0] else np.ones(1)
+    largest = float(ratios.max())
+    unit = 2.0 ** round(np.log2(largest)) if 0 < largest < np.inf else 1.0
+    return matrices / unit ** np.arange(len(matrices))[:, None, None], unit
+
+
 def linearise(matrices: Any) -> Any:
     """The state matrix, with the same eigenvalues, of shape (…, d n, d n). Its last n rows are −P₀⁻¹ (P_d … P₁).
 
@@ -241,13 +254,14 @@ def merged_eigenvalues(matrices: Complex) -> Complex:
     """
     from scipy.sparse.csgraph import connected_components
 
+    matrices, unit = scale_time(matrices)
     s, left, _ = eigenvectors_of(matrices)
     conditions = np.nan_to_num(np.abs(left).max(axis=1), nan=np.inf)
     errors = float(np.linalg.norm(linearise(matrices), 2)) * np.minimum(_ROUNDING * conditions, _MAX_MERGED)
     _, labels = connected_components(np.abs(s[:, None] - s) <= errors)
     is_same = labels[:, None] == labels
     means = is_same @ s / is_same.sum(axis=1)
-    return np.asarray(np.where(np.abs(means.real) <= errors, 1j * means.imag, means))
+    return np.asarray(unit * np.where(np.abs(means.real) <= errors, 1j * means.imag, means))
 
 
 def linearised_slopes(matrices: Complex, slopes: Complex) -> Complex:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tmsopt.records import Complex
-from tmsopt.roots.chains import SchurForm, linearise, make_cluster, schur_form
+from tmsopt.roots.chains import SchurForm, linearise, make_cluster, scale_time, schur_form
 from tmsopt.roots.patterns.complex_patterns import complex_name
 from tmsopt.roots.patterns.shape import Group
 from tmsopt.roots.patterns.structure import Structure, name_line
@@ -39,6 +39,7 @@ def spectrum(matrices: Complex, tolerance: float, is_complex: bool) -> Structure
 
     More: docs/explanation/jordan_chains.md
     """
+    matrices, unit = scale_time(matrices)
     M = linearise(matrices)
     form = schur_form(M, is_complex)
     eigenvalues = form.eigenvalues
@@ -51,8 +52,9 @@ def spectrum(matrices: Complex, tolerance: float, is_complex: bool) -> Structure
         roots = [
             r for root in upper for r in ((root, Root(root.re, -root.im, root.multiplicity)) if root.im else (root,))
         ]
+    roots = [Root(unit * r.re, unit * r.im, r.multiplicity) for r in roots]
     abscissa = max(root.re for root in roots)
-    line = [root for root in roots if root.re >= abscissa - tolerance * size]
+    line = [root for root in roots if root.re >= abscissa - tolerance * size * unit]
     groups = [Group(root.multiplicity, root.im == 0 and not is_complex) for root in line if is_complex or root.im >= 0]
     name = name_line(groups)
     return Structure(complex_name(name) if is_complex else name, rightmost_first(roots), 0.0)

@@ -13,12 +13,11 @@ from itertools import islice
 import numpy as np
 
 from tmsopt.problem import Case, Posed
-from tmsopt.problem.quantities import matrices_at
 from tmsopt.program import NLP, formulate, initial_point
 from tmsopt.program.formulate import design_of, variables_of
 from tmsopt.program.ipopt import Run, make_ipopt
 from tmsopt.program.lifts import covered_indices
-from tmsopt.program.subspaces import Spectrum, covered_cases, find_others, find_spectra, start_subspaces
+from tmsopt.program.subspaces import Spectrum, case_matrices, find_others, find_spectra, start_subspaces
 from tmsopt.program.unit_box import UnitBox
 from tmsopt.records import Array
 from tmsopt.roots.chains import eigenvalues_of
@@ -46,7 +45,7 @@ def solve_by_subspaces(state: SearchState, start: Start) -> LocalEnd:
     for _ in range(_MAX_STEPS):
         try:
             least = () if is_elastic else _count_near(part, state.nlp, design)
-            spectra = find_spectra(part, design, state.nlp.cases, [count + extra for count in least])
+            spectra = find_spectra(state.nlp, part, design, [count + extra for count in least])
             counts = tuple(len(one.eigenvalues) for one in spectra)
             nlp = state.nlp if is_elastic else make_program(part, state.nlp.cases, counts)
             nlp = start_subspaces(nlp, part, spectra)
@@ -90,8 +89,8 @@ def make_program(problem: Posed, cases: tuple[Case, ...], counts: tuple[int, ...
 def _count_near(problem: Posed, nlp: NLP, design: Mapping[str, float]) -> list[int]:
     """The number of eigenvalues near the rightmost one in each case; at least two."""
     counts = list[int]()
-    for case in covered_cases(nlp.cases):
-        s = eigenvalues_of(matrices_at(problem.model, problem.parameter_set, case.applied(problem.ordered(design))))
+    for matrices in case_matrices(nlp, problem, design):
+        s = eigenvalues_of(matrices)
         size = float(np.abs(s - s.mean() * problem.model.is_complex).mean())
         counts.append(min(max(2, int(np.sum(s.real >= s.real.max() - _NEAR_LINE * size))), len(s)))
     return counts
@@ -137,10 +136,9 @@ def _has_crossed(problem: Posed, spectra: Sequence[Spectrum], end: LocalEnd) -> 
     nlp, x = end.nlp, end.run.x
     if "abscissa" not in nlp.variables:
         return False
-    gamma = x[nlp.variables.index("abscissa")] * nlp.unit
-    names, design = np.array(nlp.variables), design_of(problem, x.tolist())
-    for k, case, one in zip(covered_indices(nlp.cases), covered_cases(nlp.cases), spectra, strict=True):
-        matrices = matrices_at(problem.model, problem.parameter_set, case.applied(problem.ordered(design)))
+    gamma, names = x[nlp.variables.index("abscissa")], np.array(nlp.variables)
+    every = case_matrices(nlp, problem, design_of(problem, x.tolist()))
+    for k, matrices, one in zip(covered_indices(nlp.cases), every, spectra, strict=True):
         vectors = x[names == f"subspace.{k}"].reshape(len(one.eigenvalues), -1)
         others = find_others(matrices, vectors[:, ::2] + 1j * vectors[:, 1::2] if problem.model.is_complex else vectors)
         size = float(np.abs(np.concatenate([others, one.eigenvalues])).max())
