@@ -63,7 +63,9 @@ def has_chains(problem: Posed) -> bool:
     if not (model.statement is not None and model.pencil is not None and problem.locate and problem.free):
         return False
     is_sole_task = problem.objective is None and not has_equalities(problem)
-    return model.polynomial is None or (is_sole_task and not problem.cases)
+    if model.polynomial is None:
+        return not problem.asks_radius
+    return is_sole_task and not problem.cases
 
 
 def has_equalities(problem: Posed) -> bool:

@@ -126,7 +126,7 @@ def solve_any_status(
         options = replace(options, near=near)
     if (
         has_chains(problem)
-        and policy.local is POLICY.local
+        and (policy.local is POLICY.local or problem.model.polynomial is None)
         and (outcome := locate_by_chains(problem, options, extra_starts))
     ):
         notes = (*sense_notes(problem), *_describe_hermitian(problem))
@@ -142,18 +142,15 @@ def solve_any_status(
         return solution
     solution = form.to_user(solution, problem)
     if solution.status == "optimal" and problem.pattern is not None:
-        checked = recheck(
-            problem, solution.parameters
-        )  # the polynomial of the real form has rounding errors of its own
+        checked = recheck(problem, solution.parameters)  # the polynomial has rounding errors of its own
         if problem.pattern.name in checked.violations:
             solution = replace(solution, status="not_converged", violations=checked.amounts)
-    return replace(solution, notes=(*solution.notes, *_describe_hermitian(problem)))
+    return solution
 
 
 def _needs_polynomial(problem: Posed) -> bool:
     """Whether a search uses factors of the polynomial, although matrices may have none."""
-    names = (RADIUS, "damping_ratio", ANGULAR_FREQUENCY)
-    return problem.pattern is not None or any(problem.asks(name) for name in names)
+    return any(problem.asks(name) for name in (RADIUS, "damping_ratio", ANGULAR_FREQUENCY))
 
 
 def _search_box(
