@@ -30,7 +30,7 @@ from tmsopt.search.all_points import prove_all_points
 from tmsopt.search.local_search import solve_from
 from tmsopt.search.locate import REACH_OF_CROSSING, has_chains, has_equalities
 from tmsopt.search.newton import build_square_system, estimate_error, find_zero, make_zero
-from tmsopt.search.solve import solve_any_status
+from tmsopt.search.solve import make_solution
 from tmsopt.search.state import SearchState, Start, clip_to_box, is_close
 
 MAX_STARTS = 1024
@@ -176,7 +176,7 @@ def solve_all(problem: ProblemSource, *, seconds: float = SECONDS, **options: Un
     can_prove = seconds > 0 and has_chains(problem) and problem.model.degree <= MAX_PROVED_SIZE
     solutions, proved_flags, bounds = list[Solution](), list[bool](), list[Table[float]]()
     for entry in (*search_entries, *proof_only_entries):
-        solution = _make_solution(problem, entry.design)
+        solution = make_solution(problem, entry.design)
         matches = [other for other in proved_entries if entry.is_same(problem, other)]
         is_proved = bool(matches) or (can_prove and prove_point(problem, problem.ordered(entry.design)) is not None)
         errors = entry.errors | (matches[0].errors if matches else {})
@@ -375,9 +375,3 @@ def estimate_coverage(start_count: int, hits: list[int], singular: int = 0) -> C
     deviation = math.sqrt(hit_once + 2 * hit_twice)
     chance = min(1.0, (hit_once + _DEVIATIONS * deviation + _UNSEEN_EVENTS) / max(start_count, 1))
     return Coverage(start_count, tuple(hits), _estimate_total(hits), chance, singular)
-
-
-def _make_solution(problem: Posed, design: Mapping[str, float]) -> Solution:
-    """Make the solution at a design by solving the same problem with all parameters fixed there."""
-    fixed = solve_any_status(problem.derive(fixed=problem.ordered(design), free={}, start={}))
-    return replace(fixed, problem=problem.problem, freedom=degrees_of_freedom(problem), formulation="matching")

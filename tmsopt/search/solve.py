@@ -253,6 +253,12 @@ def evaluate_design(problem: Posed, design: Mapping[str, float], note: str) -> S
     return _assemble(problem, assess_design(problem, design, note), (), {}, time.perf_counter())
 
 
+def make_solution(problem: Posed, design: Mapping[str, float]) -> Solution:
+    """The solution at a design that satisfies the equations of the located pattern."""
+    outcome = replace(assess_design(problem, design, is_fixed=True), formulation="matching")
+    return _assemble(problem, outcome, (), {}, time.perf_counter())
+
+
 def _find_best_so_far(problem: Posed, searched_parts: Sequence[SearchedPart], outcome: Outcome | None) -> Outcome:
     """Return the best design of an interrupted search, among the ends and the sampled designs.
 
