@@ -25,6 +25,7 @@ from tmsopt.roots.polynomial import characteristic_polynomial, product
 
 _NEGLIGIBLE = 2.0**-300  # a smaller spread comes from rounding, and its carrier would underflow
 _MIN_SPREAD = 1e-6  # least spread, relative to the largest frequency; a smaller one would not save digits
+_MIN_SHARE = 1 / 64  # least spread relative to A; the eigenvalues of a defective A have no spread, but a large rounding
 _SAMPLE_SIZE = 256  # designs of a sample of the ranges
 _SPREAD_FACTOR = 1.25  # the spread in a sample is multiplied by this factor
 _MAX_CORNER_PARAMETERS = 8  # with more parameters, a sample does not contain the corners of the ranges
@@ -107,23 +108,26 @@ def _bound_frequencies(entries: Sequence[Node], box: Mapping[str, Interval]) -> 
     Args:
         entries: real and imaginary part of each entry of A.
     """
-    sample = _sample_frequencies(formula(entries, box), math.isqrt(len(entries) // 2), [*box.values()])
-    if not sample.size:
+    sample = _sample_matrices(formula(entries, box), math.isqrt(len(entries) // 2), [*box.values()])
+    if not len(sample):
         return 0.0, 1.0
-    low, high = float(sample.real.min()), float(sample.real.max())
-    spread = _SPREAD_FACTOR * max((high - low) / 2, float(np.abs(sample.imag).max()))
-    spread = max(spread, _MIN_SPREAD * max(abs(low), abs(high)))  # equal entries have a spread from rounding only
+    omega = 1j * np.linalg.eigvals(sample)
+    low, high = float(omega.real.min()), float(omega.real.max())
+    spread = _SPREAD_FACTOR * max((high - low) / 2, float(np.abs(omega.imag).max()))
+    means = omega.mean(axis=-1)[:, None, None] * np.eye(sample.shape[-1])
+    size = float(np.linalg.norm(1j * sample - means, axis=(-2, -1)).max())
+    spread = max(spread, _MIN_SHARE * size, _MIN_SPREAD * max(abs(low), abs(high)))
     return (low + high) / 2, spread if spread > _NEGLIGIBLE else 1.0
 
 
-def _sample_frequencies(matrix: Formula, n: int, box: Sequence[Interval]) -> Any:
-    """ω at designs in a box, with its corners if they are few; empty if A is finite nowhere."""
+def _sample_matrices(matrix: Formula, n: int, box: Sequence[Interval]) -> Any:
+    """A at designs in a box, with its corners if they are few, without those where it is not finite."""
     points = _unit_points(len(box))
     if len(box) <= _MAX_CORNER_PARAMETERS:
         points = np.concatenate([points, np.array(list(combinations((0.0, 1.0), repeat=len(box))))])
     entries = _evaluate(matrix, box, points)
     A = (entries[::2] + 1j * entries[1::2]).T.reshape(-1, n, n)
-    return 1j * np.linalg.eigvals(A[np.isfinite(A).all(axis=(1, 2))])
+    return A[np.isfinite(A).all(axis=(1, 2))]
 
 
 def _evaluate(outputs: Formula, box: Sequence[Interval], points: Array) -> Array:
