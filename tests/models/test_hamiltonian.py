@@ -213,3 +213,10 @@ def test_the_realised_abscissa_is_that_of_the_stored_parameters():
     g = 1 + 2.0**-50
     found = tmsopt.solve(tmsopt.Problem(pair, fixed={"g": g}))
     assert found.abscissa_realised == pytest.approx(math.sqrt((g - 1) * (g + 1)), rel=1e-12)
+
+
+def test_a_defective_matrix_has_a_report():
+    """At a fixed EP the eigenvalues have no spread; its carrier must still keep them from their conjugates."""
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian([["1j*g", 1], [1, "-1j*g"]]), fixed={"g": 1.0}))
+    assert found.edges == ("weave",)
+    assert "growing as t" in str(found)
