@@ -161,9 +161,8 @@ def _evaluate_signature(
             signature = a / a[0] / unit ** np.arange(len(a))
         else:
             state, is_defined = linearise_batch(matrices_at(problem.model, problem.parameter_set, parameters) + 0j)
-            state = np.where(is_defined, state / unit, np.nan)
-            is_small = is_defined and len(state) <= _MAX_COEFFICIENTS
-            signature = np.poly(state) if is_small else state.ravel()
+            state = state / unit
+            signature = np.append(np.poly(state) if len(state) <= _MAX_COEFFICIENTS else state, is_defined or np.nan)
         values = values.with_known(dict.fromkeys(_ROOT_NAMES, 0.5))
         return [*signature.real, *signature.imag], [float(e(values)) for e in expressions]
 

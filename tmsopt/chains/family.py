@@ -93,7 +93,8 @@ def _compile(parts: Formula, shape: tuple[int, ...]) -> Callable[[Array], tuple[
     function, places = ca.Function("matrices", [p], [column, ca.jacobian(column, p)]), np.flatnonzero(is_varying)
 
     def join(numbers: Array) -> Complex:
-        return np.asarray((numbers[..., ::2] + 1j * numbers[..., 1::2]).reshape(*numbers.shape[:-1], *shape))
+        with np.errstate(invalid="ignore"):  # nan where an entry is undefined
+            return np.asarray((numbers[..., ::2] + 1j * numbers[..., 1::2]).reshape(*numbers.shape[:-1], *shape))
 
     @lru_cache(maxsize=8)
     def expand_at(p: tuple[float, ...]) -> tuple[Complex, Complex]:

@@ -37,7 +37,7 @@ from tmsopt.algebra.formula import (
 )
 from tmsopt.algebra.identity import multiply_out
 from tmsopt.algebra.intervals import ball, ranges
-from tmsopt.algebra.kinds import BALLS, quotient_or_nan, values
+from tmsopt.algebra.kinds import BALLS, NODES, gradients, quotient_or_nan, values
 from tmsopt.models import Model, ParameterSet
 from tmsopt.models.stated.pairs import list_parts
 from tmsopt.problem.problem import Posed
@@ -87,8 +87,12 @@ def _trace_bound(problem: Posed, value: float) -> Bound:
     mean = _mean_formula(problem.model, first_case)
     if mean is None:
         return Bound()
+    (slopes,) = gradients([fold(mean, symbols := {n: symbol(n) for n in mean.names}, NODES)[0]], [*symbols.values()])
+    box = [*first_case.free.values()]
     try:
-        ((low, _),) = ranges(mean, [*first_case.free.values()])
+        signs = ranges(formula(slopes, mean.names), box)
+        corner = [(a, a) if s >= 0 else (b, b) if t <= 0 else (a, b) for (s, t), (a, b) in zip(signs, box, strict=True)]
+        ((low, _),) = ranges(mean, corner)
     except UnsupportedOperation:
         return Bound()
     return _compare_with_bound(low, value, "relation", objective_size(problem))

@@ -39,6 +39,7 @@ SECONDS = 60.0
 """Default time limit of a proof."""
 
 _SINGULAR = "the equations are (nearly) singular there: the solution is one of a continuum, or two solutions meet"
+_CLEAR = 1e-9  # relative distance from a limit that errors of numeric roots do not explain
 _TIME_OUT = "time limit reached"
 _STOPPED = "interrupted"
 # Multiplies the usual unit of the roots: many roots have the size 1, which separates small roots from large ones.
@@ -316,8 +317,12 @@ def _name_active_limits(zero: _Zero) -> str | None:
             )
             if not excess.is_finite():  # undefined somewhere in the ball: check the middle
                 middle = system.problem.ordered({n: float(balls[n].mid()) for n in system.problem.free})
-                if not condition.violation(system.problem.values(middle)) <= 0:
+                values = system.problem.values(middle)
+                if not condition.violation(values) <= 0:
                     return None
+                difference = condition.sign * float(condition(values))
+                if difference < -_CLEAR * max(map(abs, condition.sides(values))):
+                    excess = flint.arb(difference)
             margins.append((f"constraint {name}", -excess))
     if any(x < 0 for _, x in margins):
         return None

@@ -64,8 +64,6 @@ def find_spectrum(matrices: Complex, is_complex: bool, count: int) -> Spectrum:
         LinAlgError: if the leading matrix is singular, or the matrices are not finite.
     """
     M = linearise(matrices)
-    if not np.isfinite(M).all():
-        raise np.linalg.LinAlgError("the matrices are not finite")
     form = schur_form(M, is_complex)
     s = form.eigenvalues[np.lexsort((form.eigenvalues.imag, -form.eigenvalues.real))]
     count = min(count, len(s))

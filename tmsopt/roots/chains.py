@@ -334,6 +334,9 @@ class SchurForm:
 def schur_form(matrix: Complex, is_complex: bool) -> SchurForm:
     """The Schur form of a matrix, which may be real.
 
+    Raises:
+        LinAlgError: if the matrix is not finite.
+
     Example:
         >>> form = tmsopt.roots.schur_form(np.array([[0, 1], [-1, 0]], dtype=complex), is_complex=False)
         >>> sorted(form.eigenvalues.imag.tolist())
@@ -343,6 +346,8 @@ def schur_form(matrix: Complex, is_complex: bool) -> SchurForm:
     """
     from scipy.linalg import schur
 
+    if not np.isfinite(matrix).all():
+        raise np.linalg.LinAlgError("the matrix is not finite")
     T, Q = schur(matrix, output="complex")
     eigenvalues = np.diag(T) if is_complex else np.linalg.eigvals(matrix.real)
     return SchurForm(T, Q, np.asarray(eigenvalues, dtype=complex))
