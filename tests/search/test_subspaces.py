@@ -137,3 +137,52 @@ def test_complex_masses_in_any_unit_of_time():
     found = tmsopt.solve(tmsopt.Problem(model, fixed={"e": 0.0}, free={"c": (w, 12 * w)}, minimize="abscissa"))
     assert found.parameters["c"] == pytest.approx(6 * w, rel=1e-7)
     assert found.abscissa == pytest.approx(-3 * w, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_the_lowest_ep2_below_which_other_modes_cross():
+    """EP2 at x = ±1/2, y = 0 with loss z; the loss of the best other mode is 2 − z, so z = 1 is best."""
+    n = 14
+    rows = [[f"{i} - 1j*(2 + 0.1*{i - 2} - z)" if i == j else 0 for j in range(n)] for i in range(n)]
+    rows[0][:2], rows[1][:2] = ["x + 1j*y - 1j*z", 1], [-0.25, "-x - 1j*y - 1j*z"]
+    free = {"x": (-1, 1), "y": (-1, 1), "z": (0, 3)}
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(rows), free=free, locate="EP2", minimize="abscissa"))
+    assert (found.status, found.parameters["z"]) == ("optimal", pytest.approx(1, abs=1e-7))
+    assert found.abscissa == pytest.approx(-1, abs=1e-7)
+
+
+def test_the_least_loss_at_a_corner():
+    """A mode that loses nothing, coupled to a lossy one: the abscissa is greatest with the least coupling."""
+    dimer = from_hamiltonian([["w - 1j*g", "k"], ["k", "-0.3j"]])
+    free = {"w": (-1, 1), "g": (0, 0.2), "k": (0.1, 1)}
+    found = tmsopt.solve(tmsopt.Problem(dimer, free=free, maximize="abscissa"))
+    assert found.status == "optimal"
+    assert {n: abs(x) for n, x in found.parameters.items()} == pytest.approx({"w": 1, "g": 0, "k": 0.1}, abs=1e-8)
+    s = np.linalg.eigvals([[-1j, -0.1j], [-0.1j, -0.3]])
+    assert found.abscissa == pytest.approx(s.real.max(), abs=EXACT)
+
+
+def test_an_exceptional_point_that_no_limit_admits_names_the_limit():
+    problem = tmsopt.Problem(
+        chain(2, DIMER),
+        free={"d": (-1, 1), "g": (0.3, 1.0)},
+        fixed={"k": 0.2},
+        locate="EP2",
+        constraints={"loss": "abscissa <= -0.6"},
+    )
+    found = tmsopt.solve(problem, throw=False)
+    assert found.status == "not_converged"
+    assert "violate loss" in " ".join(found.notes)
+
+
+@pytest.mark.parametrize("entry", ["log(w - 2)", "sqrt(w)"])
+def test_entries_that_are_undefined_in_the_box(entry):
+    """log(w − 2) nowhere has a value; sqrt(w) has one for w ≥ 0, where g and 0.1 have the mean loss 1.05."""
+    rows = [[f"{entry} - 1j*g", "k"], ["k", "-0.1j"]]
+    free = {"w": (-1, 1), "g": (0, 2), "k": (0.1, 1)}
+    found = tmsopt.solve(tmsopt.Problem(from_hamiltonian(rows), free=free, minimize="abscissa"), throw=False)
+    assert str(found)
+    if entry == "sqrt(w)":
+        assert found.abscissa == pytest.approx(-1.05, abs=1e-8)  # the slope of sqrt(w) is infinite at w = 0
+    else:
+        assert found.status != "optimal"

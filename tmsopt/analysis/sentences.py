@@ -7,6 +7,7 @@ from tmsopt.analysis.summary import describe_better, no_design, state_bound
 from tmsopt.models.user_spectrum import describe_user_structure
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.quantities import ANGULAR_FREQUENCY, RADIUS
+from tmsopt.problem.real_form import has_real_form
 from tmsopt.problem.solution import Bound, Solution
 from tmsopt.problem.unit_system import common_unit
 from tmsopt.problem.verdict.stability import MultipleRoot, describe_crossing
@@ -38,6 +39,8 @@ def proof_line(solution: Solution) -> str:  # noqa: PLR0911 - one per case
     text = (problem.minimize or problem.maximize or "").strip()
     names = [words for name, words in _NOT_COVERED.items() if problem.asks(name)]
     not_covered = f"branch and bound does not cover {' or '.join(names)}" if names else ""
+    if not names and not has_real_form(problem.model):
+        not_covered = "--certify does not cover matrices without a characteristic polynomial"
     if solution.status == "infeasible":
         if bound.proven:
             return "no design meets all limits"

@@ -108,10 +108,10 @@ def real_form(problem: Posed) -> RealForm:
     """
     model = problem.model
     if not has_real_form(model):
-        accepted = "A up to 12 × 12, M, D, K up to 6 × 6, complex H and A up to 6 × 6"
+        accepted = "real A up to 12 × 12, real M, D, K up to 6 × 6, complex H and A up to 6 × 6"
         can = "minimise the abscissa, locate a pattern, prove it, list all points with --all, or draw `tmsopt chart`"
         raise input_error(
-            f"needs the characteristic polynomial; accepted here: {accepted}; larger ones: {can}", "model"
+            f"needs the characteristic polynomial; accepted here: {accepted}; with others: {can}", "model"
         )
     if model.polynomial is not None:
         return RealForm(problem)

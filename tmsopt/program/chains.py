@@ -12,40 +12,56 @@ from tmsopt.problem.dependence import needs_two_sided_bounds
 from tmsopt.problem.problem import Posed
 from tmsopt.program.formulate import Builder, default_start
 from tmsopt.program.kinks import epigraph_form
-from tmsopt.program.nlp import NLP
+from tmsopt.program.nlp import NLP, scale_of
 from tmsopt.program.starts import initial_point
-from tmsopt.program.subspaces import find_spectra, start_subspaces
+from tmsopt.program.subspaces import covered_cases, default_count, find_spectra, start_subspaces
 from tmsopt.records import Array
 from tmsopt.roots.chains import Chain, expand, size_at
 
 
-def formulate_chains(problem: Posed, targets: Sequence[Target], point: ExceptionalPoint) -> tuple[NLP, Array]:
+def formulate_chains(
+    problem: Posed, targets: Sequence[Target], point: ExceptionalPoint, extra: int = 0
+) -> tuple[NLP, Array]:
     """Optimise the objective, or the distance to the start, with the chains as variables; and the start at a point.
 
     The equations Σ L_i x_(j−i) = 0 with the Taylor coefficients L_i of the matrix polynomial, and c* x_j constant, are
     polynomials in the eigenvalues and the vectors x_j.
+
+    Args:
+        extra: number of eigenvalues that the subspaces of the abscissa have in addition to `default_count`.
     """
-    build, x = Builder(problem, problem.cases), list[float]()
+    x, design, degree = list[float](), dict(zip(problem.free, point.p.tolist(), strict=True)), problem.model.degree
+    counts = [min(default_count(degree) + extra, degree)] * len(covered_cases(problem.cases))
+    has_subspaces = problem.model.polynomial is None and problem.asks("abscissa")
+    spectra = find_spectra(problem, design, problem.cases, scale_of(problem).unit, counts) if has_subspaces else []
+    build = Builder(problem, problem.cases, counts=[len(one.eigenvalues) for one in spectra])
     *_, parameters = build.values[0].given
     assert problem.model.pencil is not None
     assert problem.pattern is not None
     pencil = [np.array(P, dtype=object) for P in problem.model.pencil(problem.parameter_set.native(parameters))]
+    roots = list[Pair]()
     for target, chain in zip(targets, point.chains, strict=True):
-        x += _add_chain(build, problem.pattern.name, target, chain, pencil)
+        root, values = _add_chain(build, problem.pattern.name, target, chain, pencil)
+        roots.append(root)
+        x += values
     build.add_constraints()
     if problem.objective is not None:
         build.add_objective()
     else:
         build.minimise_distance(default_start(problem))
+    if "abscissa" in build.quantities:  # the subspaces may leave these eigenvalues out
+        for root in roots:
+            build.add_row("abscissa", root.re - build.quantities["abscissa"], -np.inf, 0.0)
     nlp = epigraph_form(build.finish("chains"), needs_two_sided_bounds(problem))
-    design = dict(zip(problem.free, point.p.tolist(), strict=True))
-    if problem.model.polynomial is None:
-        nlp = start_subspaces(nlp, problem, find_spectra(nlp, problem, design))
+    if spectra:
+        nlp = start_subspaces(nlp, problem, spectra)
     return nlp, initial_point(nlp, problem, design, is_near=True, known=x)
 
 
-def _add_chain(build: Builder, name: str, target: Target, chain: Chain, pencil: Sequence[Any]) -> list[float]:
-    """Add an eigenvalue and its chain; return their values at the point."""
+def _add_chain(
+    build: Builder, name: str, target: Target, chain: Chain, pencil: Sequence[Any]
+) -> tuple[Pair, list[float]]:
+    """Add an eigenvalue and its chain; return the eigenvalue, and the values of both at the point."""
     is_complex = build.problem.model.is_complex
     is_real = target.is_real(is_complex)
     size, values = size_at(np.array([chain.terms[0], chain.terms[0]]), 0.0), list[float]()
@@ -78,4 +94,4 @@ def _add_chain(build: Builder, name: str, target: Target, chain: Chain, pencil: 
         for equation in (*residual, normal):
             for part in (equation.re, equation.im)[: len(plane)]:
                 build.add_row(name, part, 0.0, 0.0)
-    return values
+    return s, values

@@ -94,22 +94,25 @@ def default_count(degree: int) -> int:
     return degree if degree <= _MAX_WHOLE else 2
 
 
-def find_spectra(nlp: NLP, problem: Posed, design: Numbers, counts: Iterable[int] = ()) -> list[Spectrum]:
-    """The rightmost eigenvalues of a design in each case of an NLP that root quantities cover.
+def find_spectra(
+    problem: Posed, design: Numbers, cases: Sequence[Case], unit: float, counts: Iterable[int] = ()
+) -> list[Spectrum]:
+    """The rightmost eigenvalues of a design in each case that root quantities cover.
 
     Args:
+        cases, unit: those of the NLP.
         counts: numbers of eigenvalues; by default `default_count`.
     """
-    every, model = case_matrices(nlp, problem, design), problem.model
+    every, model = case_matrices(problem, design, cases, unit), problem.model
     counts = counts or [default_count(model.degree)] * len(every)
     return [find_spectrum(P, model.is_complex, count) for P, count in zip(every, counts, strict=True)]
 
 
-def case_matrices(nlp: NLP, problem: Posed, design: Numbers) -> list[Complex]:
-    """The matrices of a design in each case of an NLP that root quantities cover, for s in the unit of the NLP."""
+def case_matrices(problem: Posed, design: Numbers, cases: Sequence[Case], unit: float) -> list[Complex]:
+    """The matrices of a design in each case that root quantities cover, for s in a unit."""
     model, parameter_set, nominal = problem.model, problem.parameter_set, problem.ordered(design)
-    every = [matrices_at(model, parameter_set, case.applied(nominal)) for case in covered_cases(nlp.cases)]
-    return [P / nlp.unit ** np.arange(len(P))[:, None, None] for P in every]
+    every = [matrices_at(model, parameter_set, case.applied(nominal)) for case in covered_cases(cases)]
+    return [P / unit ** np.arange(len(P))[:, None, None] for P in every]
 
 
 def covered_cases(cases: Sequence[Case]) -> list[Case]:

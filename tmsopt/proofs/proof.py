@@ -261,7 +261,9 @@ def _prove_first(
     expected_pattern = next((p for p in patterns if p.name == name), None)
     stored_design = enclose_stored(problem, design)
     if stored_design is None:
-        reason = reasons[0] if reasons else "a0 may be 0: a root may be at infinity"
+        is_covered = has_real_form(problem.model)
+        doubt = "a0 may be 0: a root may be at infinity" if is_covered else "of these matrices only patterns are proved"
+        reason = reasons[0] if reasons else doubt
         return Proof(_state_claim(name, expected_pattern, problem.model.noun), False, reason, name, digits=digits)
     reasons = reasons or _simple_doubts(problem, structure, stored_design)
     return _assemble(problem, design, name, expected_pattern, stored_design, digits, reasons, stored=True)

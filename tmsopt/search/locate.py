@@ -1,6 +1,7 @@
 """Locate a pattern in a system of matrices by its Jordan chains, from many starts."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 
@@ -38,7 +39,11 @@ _MIN_STARTS = 12  # starts that look for other solutions
 _SAME_POINT = 1e-7  # relative to each range: points that differ less are one solution
 _ROUNDINGS = 8  # units in the last place by which a parameter may change to become a short decimal
 _ZERO = 2.0**-52
-_MAX_OPTIMISED = 8  # points from which the objective is optimised
+_STARTS_TO_OPTIMISE = 40  # starts that look for points from which the objective is optimised
+_MAX_OPTIMISED = 40  # these points at most; a fifth of them for many eigenvalues
+_FEW_EIGENVALUES = 12
+_EXTRA_EIGENVALUES = (0, 4, 8)  # in the subspaces of the abscissa
+_CLAIM = 1e-6  # relative difference between the objective of the program and that of the recheck
 _STATIONARY = 1e-7  # largest gradient of the Lagrangian, and largest violation of a row, of an optimum
 _MAX_OVERSHOOT = 1e-9  # relative to a range: a point this far outside it still counts as inside
 
@@ -91,6 +96,9 @@ def locate_by_chains(
         return None
     if problem.model.is_complex and find_symmetry(problem).is_hermitian:  # then a few starts show where roots cross
         options = replace(options, starts=min(options.starts, _MIN_STARTS))
+    is_few = problem.model.degree <= _FEW_EIGENVALUES
+    has_choice = problem.objective is not None and degrees_of_freedom(problem).count > 0
+    least_starts = _STARTS_TO_OPTIMISE if has_choice and is_few else _MIN_STARTS
     begin(options.progress, "searching", "start")
     found, start_count, end = list[_Found](), 0, None
     for start in chain([first], (_vector(problem, design) for design in further)):
@@ -103,7 +111,7 @@ def locate_by_chains(
         if options.progress:
             options.progress(start_count, options.starts)
         if start_count >= options.starts or (
-            start_count >= min(_MIN_STARTS, options.starts) and any(not f.violated for f in found)
+            start_count >= min(least_starts, options.starts) and any(not f.violated for f in found)
         ):
             break
     found.sort(key=lambda f: float(np.linalg.norm((f.point.p - first) / family.widths)))
@@ -112,12 +120,12 @@ def locate_by_chains(
         return _optimise(problem, family, targets, found, options, start_count)
     feasible = [f for f in found if not f.violated]
     if not feasible:
-        return _fail(problem, first if end is None else end, start_count)
+        return _fail(problem, first if end is None else end, start_count, found)
     best, others = feasible[0], [f for f in found if f is not feasible[0]]
     is_square = degrees_of_freedom(problem).count <= 0
     checked = recheck(problem, best.parameters)
     if checked.violations:
-        return _fail(problem, best.point.p, start_count)
+        return _fail(problem, best.point.p, start_count, found)
     return Outcome(
         parameters=best.parameters,
         checked=checked,
@@ -142,9 +150,27 @@ def _optimise(
     start_count: int,
 ) -> Outcome | None:
     """The best end of IPOPT from points with the pattern; None if none is an optimum and the factors can follow."""
+    most = _MAX_OPTIMISED if problem.model.degree <= _FEW_EIGENVALUES else _MAX_OPTIMISED // 5
+    ranked = sorted(found, key=lambda f: (len(f.violated), _sum_violations(problem, f.parameters)))
+    starts = Starts(start_count, len(found), 1, runs=start_count)
+    ends = (_optimise_from(problem, family, targets, known.point, options) for known in ranked[:most])
+    outcomes = [replace(end, starts=starts) for end in ends]
+    best = min(
+        outcomes, key=lambda o: (o.status != "optimal", sum(o.checked.violations.values()), _rank_objective(problem, o))
+    )
+    agreeing = [o for o in outcomes if o.status == "optimal" and _is_same_objective(problem, o, best)]
+    notes = (_describe_violations(best.checked.violations),) if best.checked.violations else ()
+    best = replace(best, starts=replace(best.starts, at_best=len(agreeing)), notes=notes)
+    return best if best.status == "optimal" or problem.model.polynomial is None else None
+
+
+def _optimise_from(
+    problem: Posed, family: Family, targets: Sequence[Target], start: ExceptionalPoint, options: Options
+) -> Outcome:
+    """The end of IPOPT from one point; with larger subspaces if an eigenvalue outside crosses the line Re s = γ."""
     outcomes = list[Outcome]()
-    for known in sorted(found, key=lambda f: len(f.violated))[:_MAX_OPTIMISED]:
-        nlp, x = formulate_chains(problem, targets, known.point)
+    for extra in _EXTRA_EIGENVALUES:
+        nlp, x = formulate_chains(problem, targets, start, extra)
         point = make_polisher(nlp)(make_ipopt(nlp, options, "near")(x), nlp)
         p = np.clip(point.x[: len(problem.free)], *family.box.T)
         exact = refine_near(family, targets, p)
@@ -152,18 +178,24 @@ def _optimise(
             p = np.clip(exact.p, *family.box.T)
         parameters = problem.ordered(dict(zip(problem.free, p.tolist(), strict=True)))
         checked = recheck(problem, parameters)
-        is_optimal = not checked.violations and max(point.stationarity, point.violation) <= _STATIONARY
-        starts = Starts(start_count, len(found), 1, runs=start_count)
+        is_stationary = max(point.stationarity, point.violation) <= _STATIONARY
+        claim = problem.sign * point.objective if problem.objective else checked.objective
+        is_claimed = not problem.objective or math.isclose(claim, checked.objective, rel_tol=_CLAIM, abs_tol=_CLAIM)
+        status = "optimal" if is_stationary and is_claimed and not checked.violations else "not_converged"
         gains = find_active_limits(problem, nlp, point)
-        outcomes.append(
-            Outcome(parameters, checked, "optimal" if is_optimal else "not_converged", gains, starts, "chains")
-        )
-    best = min(
-        outcomes, key=lambda o: (o.status != "optimal", sum(o.checked.violations.values()), _rank_objective(problem, o))
-    )
-    agreeing = [o for o in outcomes if o.status == "optimal" and _is_same_objective(problem, o, best)]
-    best = replace(best, starts=replace(best.starts, at_best=len(agreeing)))
-    return best if best.status == "optimal" or problem.model.polynomial is None else None
+        outcomes.append(Outcome(parameters, checked, status, gains, Starts(), "chains"))
+        if is_claimed and not set(checked.violations) & set(problem.asked_of_roots):
+            break
+    return min(outcomes, key=lambda outcome: outcome.status != "optimal")
+
+
+def _describe_violations(names: Iterable[str]) -> str:
+    return f"the points with the pattern that were found violate {' or '.join(dict.fromkeys(names))}"
+
+
+def _sum_violations(problem: Posed, parameters: Mapping[str, float]) -> float:
+    values = problem.values(parameters)
+    return sum(float(condition.violation(values)) for condition in problem.conditions.values())
 
 
 def _rank_objective(problem: Posed, outcome: Outcome) -> float:
@@ -176,11 +208,17 @@ def _is_same_objective(problem: Posed, outcome: Outcome, best: Outcome) -> bool:
     return abs(a - b) <= _SAME_POINT * max(1.0, abs(b))
 
 
-def _fail(problem: Posed, p: Array, start_count: int) -> Outcome | None:
-    """The outcome if no start leads to a solution; None if the search by factors can follow."""
+def _fail(problem: Posed, p: Array, start_count: int, found: Sequence[_Found]) -> Outcome | None:
+    """The outcome if no start leads to a solution within the limits; None if the search by factors can follow."""
     if problem.model.polynomial is not None and not find_symmetry(problem).is_hermitian:
         return None
     assert problem.pattern is not None
+    inside = [f for f in found if not any(n.rpartition(".")[0] in problem.free for n in f.violated)]
+    if inside:
+        best = min(inside, key=lambda f: _sum_violations(problem, f.parameters))
+        words = _describe_violations(n for f in inside for n in f.violated)
+        outcome = assess_design(problem, best.parameters, words)
+        return replace(outcome, status="not_converged", starts=Starts(start_count, runs=start_count))
     design = problem.ordered(dict(zip(problem.free, p.tolist(), strict=True)))
     outcome = assess_design(problem, nearest_crossing(problem, problem.pattern, design, REACH_OF_CROSSING))
     words = "roots meet with more than one eigenvector" if outcome.checked.is_crossing else "try more starts"

@@ -45,7 +45,7 @@ def solve_by_subspaces(state: SearchState, start: Start) -> LocalEnd:
     for _ in range(_MAX_STEPS):
         try:
             least = () if is_elastic else _count_near(part, state.nlp, design)
-            spectra = find_spectra(state.nlp, part, design, [count + extra for count in least])
+            spectra = find_spectra(part, design, state.nlp.cases, state.nlp.unit, [count + extra for count in least])
             counts = tuple(len(one.eigenvalues) for one in spectra)
             nlp = state.nlp if is_elastic else make_program(part, state.nlp.cases, counts)
             nlp = start_subspaces(nlp, part, spectra)
@@ -54,7 +54,7 @@ def solve_by_subspaces(state: SearchState, start: Start) -> LocalEnd:
         except np.linalg.LinAlgError:
             break
         tolerance = _WORSE * (nlp.size + abs(trial.objective))
-        is_worse = start_end.feasible and trial.objective > start_end.objective + tolerance
+        is_worse = not nlp.contacts and start_end.feasible and trial.objective > start_end.objective + tolerance
         if not trial.feasible or has_crossed or is_worse:
             radius *= _SHRINK
             extra += 2 * has_crossed
@@ -89,7 +89,7 @@ def make_program(problem: Posed, cases: tuple[Case, ...], counts: tuple[int, ...
 def _count_near(problem: Posed, nlp: NLP, design: Mapping[str, float]) -> list[int]:
     """The number of eigenvalues near the rightmost one in each case; at least two."""
     counts = list[int]()
-    for matrices in case_matrices(nlp, problem, design):
+    for matrices in case_matrices(problem, design, nlp.cases, nlp.unit):
         s = eigenvalues_of(matrices)
         size = float(np.abs(s - s.mean() * problem.model.is_complex).mean())
         counts.append(min(max(2, int(np.sum(s.real >= s.real.max() - _NEAR_LINE * size))), len(s)))
@@ -112,6 +112,8 @@ def _run_ipopt(
 ) -> tuple[LocalEnd, LocalEnd]:
     """The start, and the best end of IPOPT on a few variants of the program within a trust region."""
     x, count = initial_point(nlp, state.part, design), len(state.part.free)
+    if len(x) != len(nlp.variables):
+        raise np.linalg.LinAlgError("the subspace has another size than that of the program")
     low, high = (variables_of(state.part, corner) for corner in region)
     limited = replace(nlp, lower=(*low, *nlp.lower[count:]), upper=(*high, *nlp.upper[count:]))
 
@@ -121,9 +123,8 @@ def _run_ipopt(
         excesses = np.maximum(np.array(variant.row_lower) - rows, rows - np.array(variant.row_upper)).clip(0)
         is_finite = bool(np.all(np.isfinite([f, *rows, *run.x])))
         is_feasible = is_finite and bool(excesses.max(initial=0.0) <= state.tuning.feasible_violation)
-        return LocalEnd(
-            start, replace(variant, lower=lower, upper=upper), run, f if is_finite else math.inf, is_feasible
-        )
+        rounding_gain = 2 * float(np.abs(np.nan_to_num(run.row_multipliers)) @ excesses) if is_feasible else math.inf
+        return LocalEnd(start, replace(variant, lower=lower, upper=upper), run, f + rounding_gain, is_feasible)
 
     variants = [*islice(limited.impose_contacts(x), state.tuning.max_variants)]
     runs = [make_ipopt(nlp, state.options, "near")(x, variant) for variant in variants]
@@ -137,7 +138,7 @@ def _has_crossed(problem: Posed, spectra: Sequence[Spectrum], end: LocalEnd) -> 
     if "abscissa" not in nlp.variables:
         return False
     gamma, names = x[nlp.variables.index("abscissa")], np.array(nlp.variables)
-    every = case_matrices(nlp, problem, design_of(problem, x.tolist()))
+    every = case_matrices(problem, design_of(problem, x.tolist()), nlp.cases, nlp.unit)
     for k, matrices, one in zip(covered_indices(nlp.cases), every, spectra, strict=True):
         vectors = x[names == f"subspace.{k}"].reshape(len(one.eigenvalues), -1)
         others = find_others(matrices, vectors[:, ::2] + 1j * vectors[:, 1::2] if problem.model.is_complex else vectors)
