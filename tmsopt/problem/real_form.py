@@ -109,7 +109,7 @@ def real_form(problem: Posed) -> RealForm:
     model = problem.model
     if not has_real_form(model):
         accepted = "real A up to 12 × 12, real M, D, K up to 6 × 6, complex H and A up to 6 × 6"
-        can = "minimise the abscissa, locate a pattern, prove it, list all points, or draw `tmsopt chart` and `tmsopt sheets`"
+        can = "minimise the abscissa, locate and prove a pattern, list all points, draw `tmsopt chart` and `tmsopt sheets`"
         raise input_error(
             f"needs the characteristic polynomial; accepted here: {accepted}; with others: {can}", "model"
         )
