@@ -109,10 +109,10 @@ def real_form(problem: Posed) -> RealForm:
     model = problem.model
     if not has_real_form(model):
         accepted = "real A up to 12 × 12, real M, D, K up to 6 × 6, complex H and A up to 6 × 6"
-        can = "minimise the abscissa, locate and prove a pattern, list all points, draw `tmsopt chart` and `tmsopt sheets`"
-        raise input_error(
-            f"needs the characteristic polynomial; accepted here: {accepted}; with others: {can}", "model"
-        )
+        tasks = "minimise the abscissa, locate and prove a pattern, list all points"
+        can = f"{tasks}, draw `tmsopt chart` and `tmsopt sheets`"
+        message = f"needs the characteristic polynomial; accepted here: {accepted}; with others: {can}"
+        raise input_error(message, "model")
     if model.polynomial is not None:
         return RealForm(problem)
     ranges = {n: (x, x) for n, x in problem.fixed.items()} | {**problem.free}  # over all cases
