@@ -1,5 +1,7 @@
 """The least abscissa of matrices without a polynomial, beside closed forms and eigenvalues at 40 digits."""
 
+from importlib import import_module
+
 import mpmath
 import numpy as np
 import pytest
@@ -186,3 +188,60 @@ def test_entries_that_are_undefined_in_the_box(entry):
         assert found.abscissa == pytest.approx(-1.05, abs=1e-8)  # the slope of sqrt(w) is infinite at w = 0
     else:
         assert found.status != "optimal"
+
+
+def test_a_mode_outside_the_subspace_that_crosses_the_line(monkeypatch):
+    """Losses z, 2 and 4 − 3z: from z = 0, where the third mode is far, the subspace must take it in to end at z = 1."""
+    search = import_module("tmsopt.search.subspace_search")
+    monkeypatch.setattr(search, "_descend", lambda state, space, design: design)
+    modes = from_hamiltonian([["-1j*z", 0, 0], [0, "1 - 2j", 0], [0, 0, "2 - 1j*(4 - 3*z)"]])
+    (state,) = import_module("tmsopt.search.state").begin_search(
+        tmsopt.Problem(modes, free={"z": (0, 1.3)}, minimize="abscissa").posed
+    )
+    end = search.solve_by_subspaces(state, tmsopt.Start({"z": 0.0}))
+    assert end.feasible
+    assert state.design_at(end)["z"] == pytest.approx(1, abs=1e-6)
+    assert end.objective == pytest.approx(-1, abs=1e-6)
+
+
+@pytest.mark.parametrize("quantity", ["abscissa", "damping_ratio", "angular_frequency"])
+def test_the_slopes_of_the_descent_are_those_of_differences(quantity):
+    rng = np.random.default_rng(5)
+    A = [[f"{a:.3f} + {b:.3f}*x + {c:.3f}*y + e" for a, b, c in rng.normal(size=(4, 3))] for _ in range(4)]
+    problem = tmsopt.Problem(
+        from_matrices(A=A),
+        free={"x": (-1, 1), "y": (0.1, 2)},
+        scenarios={"e": [0.0, 0.3]},
+        minimize=f"{quantity}**2 + x*y",
+        constraints={"c": f"{quantity} + x <= -5"},
+    )
+    space = import_module("tmsopt.program.unit_box").UnitBox(problem.posed)
+    descent = import_module("tmsopt.search.descent").Descent(space, 2.0, np.array([3.0]))
+    y, step = np.array([0.3, -0.4]), 1e-6
+    heights = [[descent._value(y + sign * step * e).height for sign in (1, -1)] for e in np.eye(2)]
+    assert descent._value(y).slope == pytest.approx([(a - b) / (2 * step) for a, b in heights], rel=1e-6)
+
+
+def test_stored_doubles_keep_a_limit_that_an_ep2_reaches():
+    """The least coupling with the loss 1.2346/3 is that of the EP2 k = (g − 0.2)/2 with (g + 0.2)/2 = 1.2346/3."""
+    loss = 1.2346 / 3
+    problem = tmsopt.Problem(
+        chain(2, DIMER),
+        free={"d": (-1, 1), "g": (0.3, 1.0), "k": (0.0, 1.0)},
+        minimize="k",
+        constraints={"loss": f"abscissa <= -{loss!r}"},
+    )
+    found = tmsopt.solve(problem)
+    assert found.parameters["k"] == pytest.approx(loss - 0.2, abs=1e-6)
+    d, g, k = (found.parameters[n] for n in "dgk")
+    with mpmath.workdps(50):
+        s, _ = mpmath.eig(-1j * mpmath.matrix([[mpmath.mpc(d, -g), k], [k, mpmath.mpc(0, -0.2)]]))
+        assert max(float(z.real) for z in s) <= -loss + 1e-9
+    assert not found.missed
+
+
+def test_the_mean_loss_bounds_the_best():
+    """The mean is −(g + 0.2)/2, least at g = 1."""
+    free = {"d": (-1, 1), "g": (0.0, 1.0), "k": (0.0, 0.3)}
+    found = tmsopt.solve(tmsopt.Problem(chain(2, DIMER), free=free, minimize="abscissa"))
+    assert found.bound.value == pytest.approx(-0.6, abs=1e-15)
