@@ -223,8 +223,8 @@ def test_the_slopes_of_the_descent_are_those_of_differences(quantity):
 
 
 def test_stored_doubles_keep_a_limit_that_an_ep2_reaches():
-    """The least coupling with the loss 1.2346/3 is that of the EP2 k = (g − 0.2)/2 with (g + 0.2)/2 = 1.2346/3."""
-    loss = 1.2346 / 3
+    """The least coupling with the loss 1.3/3 is that of the EP2 k = (g − 0.2)/2 with (g + 0.2)/2 = 1.3/3."""
+    loss = 1.3 / 3
     problem = tmsopt.Problem(
         chain(2, DIMER),
         free={"d": (-1, 1), "g": (0.3, 1.0), "k": (0.0, 1.0)},
