@@ -12,10 +12,10 @@ from tmsopt.models import from_hamiltonian, from_matrices
 EXACT = 1e-13  # of the size of the eigenvalues
 
 
-def chain(size, H=None):
-    """A mode chain with a weak loss each, and a block in its first entries."""
+def chain(size, H):
+    """H beside modes that lose 1 each."""
     rows = [[f"{i} - 1j" if i == j else 0 for j in range(size)] for i in range(size)]
-    for i, row in enumerate(H or []):
+    for i, row in enumerate(H):
         rows[i][: len(row)] = row
     return from_hamiltonian(rows)
 
@@ -35,6 +35,8 @@ def test_a_lossy_dimer_loses_its_mean_beside_any_number_of_modes(size):
     assert found.abscissa == pytest.approx(-0.5, abs=EXACT)
     assert found.structure == "EP2"
     assert "k.max" in found.active
+    if size == 2:  # no mean of the losses is greater than that at g = 1
+        assert found.bound.value == pytest.approx(-0.6, abs=1e-15)
 
 
 @pytest.mark.slow
@@ -204,16 +206,15 @@ def test_a_mode_outside_the_subspace_that_crosses_the_line(monkeypatch):
     assert end.objective == pytest.approx(-1, abs=1e-6)
 
 
-@pytest.mark.parametrize("quantity", ["abscissa", "damping_ratio", "angular_frequency"])
-def test_the_slopes_of_the_descent_are_those_of_differences(quantity):
+def test_the_slopes_of_the_descent_are_those_of_differences():
     rng = np.random.default_rng(5)
     A = [[f"{a:.3f} + {b:.3f}*x + {c:.3f}*y + e" for a, b, c in rng.normal(size=(4, 3))] for _ in range(4)]
     problem = tmsopt.Problem(
         from_matrices(A=A),
         free={"x": (-1, 1), "y": (0.1, 2)},
         scenarios={"e": [0.0, 0.3]},
-        minimize=f"{quantity}**2 + x*y",
-        constraints={"c": f"{quantity} + x <= -5"},
+        minimize="abscissa**2 + x*y",
+        constraints={"c": "abscissa + x <= -5"},
     )
     space = import_module("tmsopt.program.unit_box").UnitBox(problem.posed)
     descent = import_module("tmsopt.search.descent").Descent(space, 2.0, np.array([3.0]))
@@ -238,10 +239,3 @@ def test_stored_doubles_keep_a_limit_that_an_ep2_reaches():
         s, _ = mpmath.eig(-1j * mpmath.matrix([[mpmath.mpc(d, -g), k], [k, mpmath.mpc(0, -0.2)]]))
         assert max(float(z.real) for z in s) <= -loss + 1e-9
     assert not found.missed
-
-
-def test_the_mean_loss_bounds_the_best():
-    """The mean is −(g + 0.2)/2, least at g = 1."""
-    free = {"d": (-1, 1), "g": (0.0, 1.0), "k": (0.0, 0.3)}
-    found = tmsopt.solve(tmsopt.Problem(chain(2, DIMER), free=free, minimize="abscissa"))
-    assert found.bound.value == pytest.approx(-0.6, abs=1e-15)

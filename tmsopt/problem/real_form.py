@@ -5,19 +5,23 @@ the size. A carrier, a real constant c, is subtracted from all Im s, so that no 
 the real system has the roots s − i c and their conjugates, and an EPn of A is a CEPn of the real system.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from tmsopt.algebra.formula import constant, symbol
+from tmsopt.algebra.intervals import Interval
+from tmsopt.algebra.sequence import golden_steps
 from tmsopt.errors import input_error
 from tmsopt.models.model import Model
 from tmsopt.models.stated.pairs import list_parts
-from tmsopt.models.stated.real_form import choose_carrier, real_model
+from tmsopt.models.stated.real_form import real_model
 from tmsopt.problem.cases import points_of
+from tmsopt.problem.evaluate import evaluate_matrices
 from tmsopt.problem.freedom import degrees_of_freedom
 from tmsopt.problem.problem import Posed
 from tmsopt.problem.solution import Solution
@@ -26,6 +30,13 @@ from tmsopt.roots import Root
 from tmsopt.roots.patterns.complex_patterns import complex_name, real_form_name
 
 _ROUNDING = 1e-14  # a few rounding errors, relative to the carrier
+
+_NEGLIGIBLE = 2.0**-300  # a smaller spread comes from rounding, and its carrier would underflow
+_MIN_SPREAD = 1e-6  # least spread, relative to the largest frequency
+_MIN_SHARE = 1 / 64  # and relative to H; the eigenvalues of a defective H have no spread, but a large rounding error
+_SAMPLE_SIZE = 256  # designs of a sample of the ranges
+_SPREAD_FACTOR = 1.25  # the spread in a sample is multiplied by this factor
+_MAX_CORNER_PARAMETERS = 8  # with more parameters, a sample does not contain the corners of the ranges
 
 _MAX_SIZE = 6
 """Largest number of roots of a complex system that has a real form."""
@@ -120,6 +131,26 @@ def real_form(problem: Posed) -> RealForm:
         points = [*points_of(scenario), problem.fixed[name]]
         ranges[name] = min(points), max(points)
     tolerances = {n: problem.tolerances.get(n, 0.0) for n in ranges}
-    carrier = choose_carrier(model, {n: (lo - tolerances[n], hi + tolerances[n]) for n, (lo, hi) in ranges.items()})
+    carrier = _choose_carrier(model, {n: (lo - tolerances[n], hi + tolerances[n]) for n, (lo, hi) in ranges.items()})
     locate = problem.locate and real_form_name("".join(problem.locate.split()))
     return RealForm(problem.derive(model=real_model(model, carrier), locate=locate), carrier)
+
+
+def _choose_carrier(model: Model, box: Mapping[str, Interval]) -> float:
+    """The carrier for a complex system with parameters in a box, from the eigenfrequencies ω of designs in the box.
+
+    It moves the middle of all Re ω to at least twice their spread, which is at least the largest |Im ω|.
+    """
+    ends, size = np.array([*box.values()]).reshape(-1, 2), len(box)
+    u = np.arange(_SAMPLE_SIZE)[:, None] * golden_steps(size) % 1.0
+    if size <= _MAX_CORNER_PARAMETERS:
+        u = np.concatenate([u, np.array(list(product((0.0, 1.0), repeat=size)))])
+    columns = dict(zip(box, (ends[:, 0] + np.ptp(ends, axis=1) * u).T, strict=True))
+    H = 1j * -evaluate_matrices(model, model.sets[0], columns)[..., 1, :, :].reshape(-1, model.degree, model.degree)
+    H = H[np.isfinite(H).all(axis=(1, 2))]
+    omega = np.linalg.eigvals(H) if len(H) else np.zeros((1, 1))
+    low, high = float(omega.real.min()), float(omega.real.max())
+    spread = _SPREAD_FACTOR * max((high - low) / 2, float(np.abs(omega.imag).max()))
+    distances = np.linalg.norm(H - omega.mean(axis=-1)[:, None, None] * np.eye(model.degree), axis=(-2, -1))
+    spread = max(spread, _MIN_SHARE * float(distances.max(initial=0.0)), _MIN_SPREAD * max(abs(low), abs(high)))
+    return 2 * (spread if spread > _NEGLIGIBLE else 1.0) - (low + high) / 2

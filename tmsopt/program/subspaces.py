@@ -77,16 +77,10 @@ def find_spectrum(matrices: Complex, is_complex: bool, count: int) -> Spectrum:
 
 
 def find_others(matrices: Complex, vectors: Complex) -> Complex:
-    """The eigenvalues outside an invariant subspace, without the rounding error of multiple ones inside.
-
-    Args:
-        vectors: rows that span the subspace; fewer than n of them may be independent.
-    """
-    M = linearise(matrices)
+    """The eigenvalues outside the invariant subspace that rows span, unharmed by multiple eigenvalues inside."""
     U, values, _ = np.linalg.svd(vectors.T)
-    rank = int(np.sum(values > _DEPENDENT * values[0]))
-    complement = U[:, rank:]
-    return np.linalg.eigvals(complement.conj().T @ M @ complement)
+    complement = U[:, np.sum(values > _DEPENDENT * values[0]) :]
+    return np.linalg.eigvals(complement.conj().T @ linearise(matrices) @ complement)
 
 
 def default_count(degree: int) -> int:
@@ -204,11 +198,9 @@ def _add_chain(build: MatrixBuilder, gamma: Any, case: int, count: int) -> list[
             second + right[a + 1] * pair(beta) + right[a] * (last / lengths[a]) - right[a + 2] * pair(lengths[a + 1])
         )
     for k in range(count):
-        weights = [constants(f"weight{k}.{part}", size) for part in parts]
-        total = Pair(-1)
-        for x, w in zip(vectors[0], zip(*weights, strict=True), strict=True):
-            total = total + x * Pair(w[0], -w[1] if is_complex else 0)
-        equate([total])
+        weights = constants(f"weight{k}", size * len(parts))
+        duals = map(Pair, weights[:size], [-x for x in weights[size:]] or [0] * size)
+        equate([sum((x * w for x, w in zip(vectors[0], duals, strict=True)), Pair(-1))])
     return contacts
 
 
@@ -248,18 +240,15 @@ def start_subspaces(nlp: NLP, problem: Posed, spectra: Sequence[Spectrum]) -> NL
         name = f"subspace.{case}"
         numbers |= {f"{name}.length.{k}": float(x) for k, x in enumerate(lengths)}
         for k, column in enumerate(one.basis.T):
-            for part, weights in (("re", column.real), *([("im", column.imag)] if is_complex else [])):
-                numbers |= {f"{name}.weight{k}.{part}.{j}": float(x) for j, x in enumerate(weights)}
+            weights = [*column.real, *(column.imag if is_complex else ())]
+            numbers |= {f"{name}.weight{k}.{j}": float(x) for j, x in enumerate(weights)}
     lifts = (replace(lift, guess=lambda v, z: [guess]) if lift.name == "abscissa" else lift for lift in nlp.lifts)
     return replace(nlp, numbers=Table(numbers), lifts=tuple(lifts))
 
 
 def _parts(vectors: Complex, is_complex: bool) -> list[float]:
-    return (
-        np.stack([vectors.real, vectors.imag], axis=-1).ravel().tolist()
-        if is_complex
-        else vectors.real.ravel().tolist()
-    )
+    parts = (vectors.real, vectors.imag) if is_complex else (vectors.real,)
+    return np.stack(parts, axis=-1).ravel().tolist()
 
 
 def _make_chain(spectrum: Spectrum, gamma: float, is_complex: bool) -> tuple[list[float], Array, Complex]:

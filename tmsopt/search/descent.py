@@ -1,11 +1,10 @@
 """Descends from a design by the BFGS method on the eigenvalues, with analytic slopes, to a kink of the objective.
 
-BFGS with a weak Wolfe line search goes on at kinks (Lewis and Overton, Mathematical Programming 141, 2013), but
-converges slowly there and loses digits at multiple eigenvalues; IPOPT goes on from its end. The parameters are
-functions of free variables y: p = p(sin y), with small values resolved where a range contains 0.
+BFGS with a weak Wolfe line search goes on at kinks (Lewis and Overton, Mathematical Programming 141, 2013), but slowly;
+IPOPT goes on from its end. The parameters are functions of free variables y: p = p(sin y), with small values resolved.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -16,14 +15,11 @@ from tmsopt.algebra.arrays import evaluate_on_arrays
 from tmsopt.algebra.formula import Formula, formula, symbol
 from tmsopt.algebra.kinds import gradients
 from tmsopt.chains import family_of
-from tmsopt.models.model import ROOTS
 from tmsopt.problem import Posed
-from tmsopt.problem.dependence import WORSE_DIRECTION
 from tmsopt.problem.evaluate import nodes_of
-from tmsopt.problem.quantities import ANGULAR_FREQUENCY
 from tmsopt.program.subspaces import covered_cases
 from tmsopt.program.unit_box import UnitBox
-from tmsopt.records import Array, Complex
+from tmsopt.records import Array
 from tmsopt.roots.chains import eigenvectors_of, linearised_slopes
 
 _MAX_STEPS = 200
@@ -109,16 +105,14 @@ class Descent:
         undefined = _Value(np.inf, np.zeros(len(y)))
         with np.errstate(all="ignore"):
             try:
-                roots = self._worst_roots(design)
+                abscissa, slope = self._worst_abscissa(design)
             except np.linalg.LinAlgError:
                 return undefined
-            known = {**self.problem.ordered(design), **{n: x for n, (x, _) in roots.items()}}
+            known = {**self.problem.ordered(design), "abscissa": abscissa}
             outputs = np.array([float(x) for x in evaluate_on_arrays(self._formula, known)])
             parts, slopes = np.split(outputs, [len(outputs) // (1 + len(self._names))])
-            weights, names = self._weigh(parts), list(self.problem.free)
-            inputs = np.stack(
-                [roots[n][1] if n in roots else np.array([float(m == n) for m in names]) for n in self._names]
-            )
+            weights, free = self._weigh(parts), list(self.problem.free)
+            inputs = np.array([*([n == m for m in free] for n in self.problem.parameter_set.names), slope])
             slope = weights @ slopes.reshape(len(parts), -1) @ inputs * stretches
         value = _Value(float(weights @ parts), slope)
         return value if np.isfinite([value.height, *slope]).all() else undefined
@@ -132,11 +126,11 @@ class Descent:
 
     @property
     def _names(self) -> tuple[str, ...]:
-        return (*self.problem.parameter_set.names, *(n for n in ROOTS if self.problem.asks(n)))
+        return (*self.problem.parameter_set.names, "abscissa")
 
     @cached_property
     def _formula(self) -> Formula:
-        """Objective and limits, where less is better, and their slopes by parameters and root quantities."""
+        """Objective and limits, where less is better, and their slopes by the parameters and the abscissa."""
         problem, symbols = self.problem, [symbol(n) for n in self._names]
         objectives = {"": problem.objective} if problem.objective else {}
         nodes = nodes_of(problem, {**objectives, **problem.conditions})
@@ -144,33 +138,14 @@ class Descent:
         parts = [sign * node for sign, node in zip(signs, nodes.values(), strict=True)]
         return formula([*parts, *(x for row in gradients(parts, symbols) for x in row)], self._names)
 
-    def _worst_roots(self, design: Mapping[str, float]) -> dict[str, tuple[float, Array]]:
-        """Root quantities in their worst cases, with their slopes by the free parameters."""
-        problem, worst = self.problem, dict[str, tuple[float, Array]]()
+    def _worst_abscissa(self, design: Mapping[str, float]) -> tuple[float, Array]:
+        """The abscissa in its worst case, with its slopes by the free parameters."""
+        problem, worst = self.problem, (-np.inf, np.zeros(self.space.size))
         for case in covered_cases(problem.cases):
             parameters = case.applied(problem.ordered(design))
-            family = family_of(problem, parameters)
-            matrices, slopes = family.expand(np.array([parameters[n] for n in problem.free]))
+            matrices, slopes = family_of(problem, parameters).expand(np.array([parameters[n] for n in problem.free]))
             s, left, right = eigenvectors_of(matrices)
-            changes, n = linearised_slopes(matrices, slopes), len(matrices[0])
-            for name, value, k, direction in _list_quantities(s):
-                sign = WORSE_DIRECTION[name]
-                if name not in worst or sign * value > sign * worst[name][0]:
-                    worst[name] = value, (direction * (left[k, -n:] @ changes @ right[:, k])).real
+            k, changes = int(np.argmax(s.real)), linearised_slopes(matrices, slopes)
+            if s[k].real > worst[0]:
+                worst = float(s[k].real), (left[k, -len(matrices[0]) :] @ changes @ right[:, k]).real
         return worst
-
-
-def _list_quantities(s: Complex) -> Iterator[tuple[str, float, int, complex]]:
-    """Name, value and eigenvalue s_k of each root quantity, and d with d(value) = Re(d · d s_k)."""
-    k = int(np.argmax(s.real))
-    yield "abscissa", float(s[k].real), k, 1.0
-    k = int(np.argmax(np.abs(s.imag)))
-    yield ANGULAR_FREQUENCY, float(abs(s[k].imag)), k, -1j * float(np.sign(s[k].imag))
-    sizes = np.abs(s) + np.finfo(float).tiny
-    k = int(np.argmin(-s.real / sizes))
-    yield (
-        "damping_ratio",
-        float(-s[k].real / sizes[k]),
-        k,
-        complex(s[k].real * s[k].conj() / sizes[k] ** 2 - 1) / sizes[k],
-    )

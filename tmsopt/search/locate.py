@@ -96,9 +96,9 @@ def locate_by_chains(
         return None
     if problem.model.is_complex and find_symmetry(problem).is_hermitian:  # then a few starts show where roots cross
         options = replace(options, starts=min(options.starts, _MIN_STARTS))
-    is_few = problem.model.degree <= _FEW_EIGENVALUES
     has_choice = problem.objective is not None and degrees_of_freedom(problem).count > 0
-    least_starts = _STARTS_TO_OPTIMISE if has_choice and is_few else _MIN_STARTS
+    is_thorough = has_choice and problem.model.degree <= _FEW_EIGENVALUES
+    least_starts = _STARTS_TO_OPTIMISE if is_thorough else _MIN_STARTS
     begin(options.progress, "searching", "start")
     found, start_count, end = list[_Found](), 0, None
     for start in chain([first], (_vector(problem, design) for design in further)):

@@ -1,7 +1,7 @@
 from .dimensions import Dimension as Dimension, dimension as dimension
 from .readings import (
     Reading as Reading, decay_time as decay_time, frequencies as frequencies,
-    convert_to_reading as convert_to_reading, readings as readings,
+    convert_exactly as convert_exactly, readings as readings,
 )
 from .tables import TABLES as TABLES, read_numbers as read_numbers
 from .text import (

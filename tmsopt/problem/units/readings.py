@@ -32,12 +32,6 @@ def convert_exactly(value: Any, unit: str, pi: Any = math.pi) -> tuple[Any, str,
     return value * factor / (divisor or pi), name, READING_DIGITS
 
 
-def convert_to_reading(value: float, unit: str) -> tuple[float, str]:
-    """Convert an SI number to mm, km/h or degrees with 15 digits; other units stay."""
-    value, unit, digits = convert_exactly(value, unit)
-    return float(f"{value:.{digits}g}") if digits else value, unit
-
-
 def decay_time(abscissa: Any, rate: Any) -> Any:
     """Seconds in which the slowest part of a disturbance decays to 1/e; nan if it does not decay.
 
