@@ -49,7 +49,7 @@ def formulate_chains(
         build.add_objective()
     else:
         build.minimise_distance(default_start(problem))
-    if "abscissa" in build.quantities:  # the subspaces may leave these eigenvalues out
+    if spectra and counts[0] < degree:  # a subspace of all eigenvalues has these too, and a second limit is degenerate
         for root in roots:
             build.add_row("abscissa", root.re - build.quantities["abscissa"], -np.inf, 0.0)
     nlp = epigraph_form(build.finish("chains"), needs_two_sided_bounds(problem))

@@ -28,6 +28,7 @@ from tmsopt.program.chains import formulate_chains
 from tmsopt.program.formulate import default_start
 from tmsopt.program.ipopt import make_ipopt, make_polisher
 from tmsopt.program.starts import sample_box
+from tmsopt.program.subspaces import default_count
 from tmsopt.progress import begin
 from tmsopt.records import Array, Table
 from tmsopt.search.outcome import Outcome, assess_design, find_active_limits
@@ -184,7 +185,8 @@ def _optimise_from(
         status = "optimal" if is_stationary and is_claimed and not checked.violations else "not_converged"
         gains = find_active_limits(problem, nlp, point)
         outcomes.append(Outcome(parameters, checked, status, gains, Starts(), "chains"))
-        if is_claimed and not set(checked.violations) & set(problem.asked_of_roots):
+        is_whole = default_count(problem.model.degree) + extra >= problem.model.degree
+        if is_whole or (is_claimed and not set(checked.violations) & set(problem.asked_of_roots)):
             break
     return min(outcomes, key=lambda outcome: outcome.status != "optimal")
 
